@@ -1,0 +1,49 @@
+// What a run reports: rows of the series and results of stages. Written by output.cpp, filled by experiment.cpp.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/measures.h"
+#include "protocol/case_file.h"
+
+namespace platen {
+
+struct SeriesRow {
+  std::string stage;                                            // stage name
+  double strain = std::numeric_limits<double>::quiet_NaN();     // NaN until its zero is known
+  double inertial_number = 0.0;
+  double kinetic_to_potential = 0.0;
+  Measures measures;
+};
+
+struct StageResult {
+  std::string name;
+  StageKind kind = StageKind::run;
+  std::string end_reason;              // e.g. "stress 40 kPa reached"
+  bool reached = true;                 // false: max_duration came first (exit 6)
+  std::int64_t first_step = 0, last_step = 0;
+  double time_begin = 0.0, time_end = 0.0;   // simulated [s]
+  double wall_seconds = 0.0;
+  std::int64_t particles = 0;
+  std::optional<double> strain_zero_height;  // height at which strain is 0 [m]
+  std::optional<double> strength;            // largest 5 ms mean of stress_top [Pa], crush only
+  std::optional<double> strength_strain;
+  std::optional<double> initial_stiffness;   // [Pa]
+  std::optional<bool> peak_found;
+  std::vector<std::string> warnings;
+  SeriesRow last;                            // the stage's last row
+};
+
+struct Performance {
+  int threads = 1;
+  std::string instruction_set, scene;
+  std::int64_t particle_steps = 0;
+  double wall_seconds = 0.0;
+  std::int64_t rebuilds = 0;
+};
+
+}  // namespace platen
