@@ -7,6 +7,9 @@ set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 
+# Debian's own Python, because python3-h5py is installed for that one; another python3 may come first on the PATH.
+set(PLATEN_PYTHON /usr/bin/python3 CACHE FILEPATH "Python 3 with h5py, used by tests only")
+
 add_library(platen_options INTERFACE)
 target_include_directories(platen_options INTERFACE ${CMAKE_SOURCE_DIR})
 # Contraction is off for the whole build: fma stands where it is written, so every build gives the same bits.
@@ -16,6 +19,8 @@ target_compile_options(platen_options INTERFACE
   -ffile-prefix-map=${CMAKE_SOURCE_DIR}=. -ffile-prefix-map=${CMAKE_BINARY_DIR}=build
   -Wall -Wextra -Wpedantic -Wshadow)
 if(PLATEN_SANITIZE)
-  target_compile_options(platen_options INTERFACE -fsanitize=${PLATEN_SANITIZE} -fno-omit-frame-pointer)
+  # A finding ends the program, so that a test cannot pass over it.
+  target_compile_options(platen_options INTERFACE
+    -fsanitize=${PLATEN_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(platen_options INTERFACE -fsanitize=${PLATEN_SANITIZE})
 endif()

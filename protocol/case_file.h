@@ -142,6 +142,7 @@ class CaseError : public std::runtime_error {
 
 enum class CaseUse {
   run,      // everything must be there and consistent
+  resume,   // as run, but the particle file is not read: the particles are in the checkpoint
   law_only  // only [particles.law] and, if wanted, [plates] need to be there (platen law)
 };
 

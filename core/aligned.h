@@ -1,0 +1,93 @@
+// Arrays for vector loads: 64-byte aligned, on huge pages where they are large and the system has them, each with its
+// own start within a page so that arrays of equal length do not fight for the same cache sets.
+#pragma once
+
+#include <sys/mman.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <new>
+#include <type_traits>
+
+namespace platen {
+
+// A growing array of plain numbers. Growing keeps the old content; new elements are zero.
+template <class T>
+class AlignedArray {
+  static_assert(std::is_trivially_copyable_v<T>);
+
+ public:
+  AlignedArray() = default;
+  AlignedArray(const AlignedArray&) = delete;
+  AlignedArray& operator=(const AlignedArray&) = delete;
+  AlignedArray(AlignedArray&& other) noexcept { swap(other); }
+  AlignedArray& operator=(AlignedArray&& other) noexcept {
+    swap(other);
+    return *this;
+  }
+  ~AlignedArray() { std::free(block_); }
+
+  void swap(AlignedArray& other) noexcept {
+    std::swap(block_, other.block_);
+    std::swap(data_, other.data_);
+    std::swap(size_, other.size_);
+    std::swap(capacity_, other.capacity_);
+  }
+
+  // Sets the size; elements from the old size on are zero.
+  void resize(std::size_t size) {
+    reserve(size);
+    if (size > size_) std::fill(data_ + size_, data_ + size, T{});
+    size_ = size;
+  }
+  void assign(std::size_t size, T value) {
+    size_ = 0;
+    reserve(size);
+    std::fill(data_, data_ + size, value);
+    size_ = size;
+  }
+  void reserve(std::size_t capacity) {
+    if (capacity <= capacity_) return;
+    capacity = std::max(capacity, capacity_ + capacity_ / 4);
+    const std::size_t bytes = capacity * sizeof(T);
+    const bool large = bytes >= huge_page;
+    const std::size_t alignment = large ? huge_page : 64;
+    const std::size_t stagger = large ? 64 * (next_start() % 61) : 0;
+    const std::size_t whole = (bytes + stagger + alignment - 1) / alignment * alignment;
+    void* block = std::aligned_alloc(alignment, whole);
+    if (block == nullptr) throw std::bad_alloc();
+    if (large) madvise(block, whole, MADV_HUGEPAGE);  // a wish: without huge pages everything still works
+    T* data = reinterpret_cast<T*>(static_cast<char*>(block) + stagger);
+    std::copy(data_, data_ + size_, data);
+    std::free(block_);
+    block_ = block, data_ = data, capacity_ = capacity;
+  }
+
+  T* data() { return data_; }
+  const T* data() const { return data_; }
+  std::size_t size() const { return size_; }
+  std::size_t capacity() const { return capacity_; }
+  bool empty() const { return size_ == 0; }
+  T& operator[](std::size_t k) { return data_[k]; }
+  const T& operator[](std::size_t k) const { return data_[k]; }
+  T* begin() { return data_; }
+  T* end() { return data_ + size_; }
+  const T* begin() const { return data_; }
+  const T* end() const { return data_ + size_; }
+
+ private:
+  static constexpr std::size_t huge_page = std::size_t{1} << 21;
+  static unsigned next_start() {
+    static std::atomic<unsigned> counter{0};
+    return counter.fetch_add(7, std::memory_order_relaxed);
+  }
+
+  void* block_ = nullptr;
+  T* data_ = nullptr;
+  std::size_t size_ = 0, capacity_ = 0;
+};
+
+}  // namespace platen

@@ -1,0 +1,63 @@
+// A batch: a contiguous range of particles along the Morton curve, and the contacts that it owns.
+//
+//   particles   ... | first ............ first+count | ...      whole vectors
+//   outer list  pairs of own particles within R_i + R_j + skin, by owner, then partner; lives from rebuild to rebuild
+//   inner list  those of them within R_i + R_j + gap, with the history; all that the contact kernel sees
+//   sums        [ own particles | halo slots ]           halo slot: one per foreign partner, written by this batch only,
+//                                                         read by the partner's batch through `incoming`
+//
+// A pair across two batches belongs to the batch of the lower colour; neighbouring batches never share a colour.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/aligned.h"
+#include "core/snapshot.h"
+#include "kernels/views.h"
+
+namespace platen {
+
+struct PlateList {
+  AlignedArray<std::int32_t> particle;
+  AlignedArray<double> xi_x, xi_y, xi_z, stiffness_last;  // history
+  AlignedArray<double> records, overlap;                  // of the last pass
+  std::int32_t used = 0, padded = 0;
+};
+
+// A record of another batch that belongs to one of our particles.
+struct Incoming {
+  std::int32_t batch;
+  std::int32_t slot;   // record in that batch's sum_j
+  std::int32_t local;  // our particle, from `first`
+};
+
+struct Batch {
+  std::int32_t first = 0, count = 0;
+  int colour = 0;
+
+  std::vector<std::int32_t> outer_i, outer_j;
+
+  std::int32_t used = 0, padded = 0;  // pairs of the inner list
+  AlignedArray<std::int32_t> i, j, slot_j, from;  // from: place in the outer list
+  AlignedArray<double> sp, tx, ty, tz, k_t_last;
+
+  AlignedArray<double> sum_i, sum_j;
+  std::vector<std::int32_t> halo;     // particle of each halo slot
+  std::vector<Incoming> incoming;
+  std::vector<int> partners;          // batches whose particles our outer pairs touch
+  std::vector<int> owners;            // batches whose outer pairs touch our particles
+
+  PlateList plates[plate_count];
+
+  // Since the last collection.
+  PairTotals pair_totals;             // contacts: of the last pass alone
+  std::int64_t plate_energy[term_count] = {};
+  std::int64_t plate_work = 0;
+  std::int64_t rolling = 0;
+  double path = 0.0;                  // sum over steps of the largest speed times dt [m]
+  double largest_speed = 0.0;         // of the last step [m/s]
+  bool out_of_range = false;
+};
+
+}  // namespace platen

@@ -1,0 +1,230 @@
+#include "core/neighbours.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace platen {
+
+namespace {
+
+double nearest(double d, double length) { return length > 0.0 ? d - length * std::nearbyint(d / length) : d; }
+
+struct Bounds {
+  double low[3], high[3];
+};
+
+Bounds bounds_of(const Particles& p) {
+  Bounds b;
+  const AlignedArray<double>* columns[3] = {&p.x, &p.y, &p.z};
+  for (int axis = 0; axis < 3; ++axis) {
+    b.low[axis] = std::numeric_limits<double>::infinity();
+    b.high[axis] = -b.low[axis];
+    for (std::int32_t k = 0; k < p.count; ++k) {
+      const double x = (*columns[axis])[static_cast<std::size_t>(k)];
+      b.low[axis] = std::min(b.low[axis], x);
+      b.high[axis] = std::max(b.high[axis], x);
+    }
+  }
+  return b;
+}
+
+std::uint64_t spread(std::uint64_t v) {  // 21 bits, two zeros between each
+  v &= 0x1fffff;
+  v = (v | v << 32) & 0x1f00000000ffffULL;
+  v = (v | v << 16) & 0x1f0000ff0000ffULL;
+  v = (v | v << 8) & 0x100f00f00f00f00fULL;
+  v = (v | v << 4) & 0x10c30c30c30c30c3ULL;
+  v = (v | v << 2) & 0x1249249249249249ULL;
+  return v;
+}
+
+// A grid of cells at least `reach` wide over the particles; periodic where the domain is.
+class CellGrid {
+ public:
+  CellGrid(const Particles& p, const Domain& domain, double reach) {
+    const Bounds b = bounds_of(p);
+    const double periodic[3] = {domain.width, domain.depth, 0.0};
+    double extent[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      wraps_[axis] = periodic[axis] > 0.0;
+      low_[axis] = wraps_[axis] ? 0.0 : b.low[axis];
+      extent[axis] = wraps_[axis] ? periodic[axis] : std::max(b.high[axis] - b.low[axis], reach);
+    }
+    // Sparse scenes: wider cells, so that there are never many more cells than particles.
+    double size = reach;
+    const auto cells_for = [&](double width) {
+      double product = 1.0;
+      for (double e : extent) product *= std::max(1.0, std::floor(e / width));
+      return product;
+    };
+    while (cells_for(size) > 8.0 * p.count + 64.0) size *= 1.26;
+    for (int axis = 0; axis < 3; ++axis) {
+      cells_[axis] = std::max(1, static_cast<int>(std::floor(extent[axis] / size)));
+      inverse_[axis] = cells_[axis] / extent[axis];
+    }
+    start_.assign(static_cast<std::size_t>(cells_[0]) * cells_[1] * cells_[2] + 1, 0);
+    cell_of_.resize(static_cast<std::size_t>(p.count));
+    for (std::int32_t k = 0; k < p.count; ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      cell_of_[at] = index(coordinate(p.x[at], 0), coordinate(p.y[at], 1), coordinate(p.z[at], 2));
+      ++start_[static_cast<std::size_t>(cell_of_[at]) + 1];
+    }
+    for (std::size_t c = 1; c < start_.size(); ++c) start_[c] += start_[c - 1];
+    members_.resize(static_cast<std::size_t>(p.count));
+    std::vector<std::int32_t> next(start_.begin(), start_.end() - 1);
+    for (std::int32_t k = 0; k < p.count; ++k)
+      members_[static_cast<std::size_t>(next[static_cast<std::size_t>(cell_of_[static_cast<std::size_t>(k)])]++)] = k;
+  }
+
+  // Calls visit(j) for every particle in the cells around particle i, each once.
+  template <class Visit>
+  void around(const Particles& p, std::int32_t i, const Visit& visit) const {
+    const auto at = static_cast<std::size_t>(i);
+    const int c[3] = {coordinate(p.x[at], 0), coordinate(p.y[at], 1), coordinate(p.z[at], 2)};
+    int list[3][3], length[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      length[axis] = 0;
+      for (int step = -1; step <= 1; ++step) {
+        int k = c[axis] + step;
+        if (wraps_[axis])
+          k = (k + cells_[axis]) % cells_[axis];
+        else if (k < 0 || k >= cells_[axis])
+          continue;
+        bool seen = false;  // one or two cells along a periodic axis
+        for (int m = 0; m < length[axis]; ++m) seen = seen || list[axis][m] == k;
+        if (!seen) list[axis][length[axis]++] = k;
+      }
+    }
+    for (int a = 0; a < length[2]; ++a)
+      for (int b = 0; b < length[1]; ++b)
+        for (int d = 0; d < length[0]; ++d) {
+          const auto cell = static_cast<std::size_t>(index(list[0][d], list[1][b], list[2][a]));
+          for (std::int32_t m = start_[cell]; m < start_[cell + 1]; ++m) visit(members_[static_cast<std::size_t>(m)]);
+        }
+  }
+
+ private:
+  int coordinate(double x, int axis) const {
+    const int c = static_cast<int>(std::floor((x - low_[axis]) * inverse_[axis]));
+    return std::clamp(c, 0, cells_[axis] - 1);
+  }
+  std::int32_t index(int a, int b, int c) const { return (c * cells_[1] + b) * cells_[0] + a; }
+
+  bool wraps_[3];
+  double low_[3], inverse_[3];
+  int cells_[3];
+  std::vector<std::int32_t> start_, members_, cell_of_;
+};
+
+// Greedy colouring of the batches: no two that share a pair get the same colour.
+void colour(std::vector<Batch>& batches) {
+  std::vector<char> taken;
+  for (Batch& batch : batches) batch.colour = -1;
+  for (Batch& batch : batches) {
+    taken.assign(batches.size() + 1, 0);
+    for (int other : batch.partners)
+      if (batches[static_cast<std::size_t>(other)].colour >= 0)
+        taken[static_cast<std::size_t>(batches[static_cast<std::size_t>(other)].colour)] = 1;
+    batch.colour = static_cast<int>(std::find(taken.begin(), taken.end(), 0) - taken.begin());
+  }
+}
+
+}  // namespace
+
+double Domain::nearest_x(double d) const { return nearest(d, width); }
+double Domain::nearest_y(double d) const { return nearest(d, depth); }
+
+int BatchOf::operator()(std::int32_t particle) const {
+  return static_cast<int>(std::upper_bound(starts.begin(), starts.end(), particle) - starts.begin()) - 1;
+}
+
+std::vector<std::int32_t> morton_order(const Particles& particles) {
+  const Bounds b = bounds_of(particles);
+  double side = 0.0;
+  for (int axis = 0; axis < 3; ++axis) side = std::max(side, b.high[axis] - b.low[axis]);
+  const double scale = side > 0.0 ? 2097151.0 / side : 0.0;
+  std::vector<std::pair<std::uint64_t, std::int32_t>> keys(static_cast<std::size_t>(particles.count));
+  for (std::size_t k = 0; k < keys.size(); ++k) {
+    const auto cell = [&](double x, double low) { return static_cast<std::uint64_t>((x - low) * scale); };
+    keys[k] = {spread(cell(particles.x[k], b.low[0])) | spread(cell(particles.y[k], b.low[1])) << 1 |
+                   spread(cell(particles.z[k], b.low[2])) << 2,
+               static_cast<std::int32_t>(k)};
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<std::int32_t> order(keys.size());
+  for (std::size_t k = 0; k < keys.size(); ++k) order[k] = keys[k].second;
+  return order;
+}
+
+std::vector<Batch> make_batches(const Particles& p, const Domain& domain, double skin, int size,
+                                const ParallelFor& parallel) {
+  const int vectors = p.padded / padding;
+  const int count = std::max(1, std::min(vectors, static_cast<int>(std::lround(static_cast<double>(p.padded) / size))));
+  std::vector<Batch> batches(static_cast<std::size_t>(count));
+  BatchOf batch_of;
+  for (int k = 0; k < count; ++k) {
+    const auto edge = [&](int m) { return static_cast<std::int32_t>(static_cast<std::int64_t>(vectors) * m / count) * padding; };
+    Batch& batch = batches[static_cast<std::size_t>(k)];
+    batch.first = edge(k);
+    batch.count = edge(k + 1) - edge(k);
+    batch_of.starts.push_back(batch.first);
+  }
+
+  double largest = p.common_radius;
+  if (!p.equal) largest = *std::max_element(p.radius.begin(), p.radius.begin() + p.count);
+  const CellGrid grid(p, domain, 2.0 * largest + skin);
+
+  // Every pair within a batch once, every pair across batches from both sides; then the owner keeps it.
+  parallel(count, [&](int k) {
+    Batch& batch = batches[static_cast<std::size_t>(k)];
+    std::vector<std::int32_t> close;
+    for (std::int32_t i = batch.first; i < std::min(batch.first + batch.count, p.count); ++i) {
+      const auto a = static_cast<std::size_t>(i);
+      const double Ri = p.radius_of(i);
+      close.clear();
+      grid.around(p, i, [&](std::int32_t j) {
+        const bool own = j >= batch.first && j < batch.first + batch.count;
+        if (own && j <= i) return;
+        const auto c = static_cast<std::size_t>(j);
+        const double dx = domain.nearest_x(p.x[a] - p.x[c]), dy = domain.nearest_y(p.y[a] - p.y[c]);
+        const double dz = p.z[a] - p.z[c], reach = Ri + p.radius_of(j) + skin;
+        if (dx * dx + dy * dy + dz * dz < reach * reach) close.push_back(j);
+      });
+      std::sort(close.begin(), close.end());
+      for (std::int32_t j : close) batch.outer_i.push_back(i), batch.outer_j.push_back(j);
+    }
+    for (std::int32_t j : batch.outer_j)
+      if (j < batch.first || j >= batch.first + batch.count) batch.partners.push_back(batch_of(j));
+    std::sort(batch.partners.begin(), batch.partners.end());
+    batch.partners.erase(std::unique(batch.partners.begin(), batch.partners.end()), batch.partners.end());
+  });
+  colour(batches);
+  parallel(count, [&](int k) {
+    Batch& batch = batches[static_cast<std::size_t>(k)];
+    std::size_t kept = 0;
+    for (std::size_t m = 0; m < batch.outer_j.size(); ++m) {
+      const std::int32_t j = batch.outer_j[m];
+      const bool own = j >= batch.first && j < batch.first + batch.count;
+      if (!own && batches[static_cast<std::size_t>(batch_of(j))].colour < batch.colour) continue;
+      batch.outer_i[kept] = batch.outer_i[m];
+      batch.outer_j[kept++] = j;
+    }
+    batch.outer_i.resize(kept), batch.outer_j.resize(kept);
+    batch.outer_i.shrink_to_fit(), batch.outer_j.shrink_to_fit();
+  });
+  for (int k = 0; k < count; ++k) {
+    Batch& batch = batches[static_cast<std::size_t>(k)];
+    const auto mine = batch.partners;
+    batch.partners.clear();
+    for (int other : mine) {
+      if (batches[static_cast<std::size_t>(other)].colour > batch.colour) {
+        batch.partners.push_back(other);
+        batches[static_cast<std::size_t>(other)].owners.push_back(k);
+      }
+    }
+  }
+  return batches;
+}
+
+}  // namespace platen

@@ -1,0 +1,62 @@
+#include "core/particles.h"
+
+#include "kernels/views.h"
+
+namespace platen {
+
+double sphere_mass(double R, double rho) { return 4.0 / 3.0 * 3.14159265358979323846 * (R * R * R) * rho; }
+
+void Particles::resize(std::int32_t n, bool equal_spheres) {
+  count = n;
+  padded = (n + padding - 1) / padding * padding;
+  equal = equal_spheres;
+  const auto size = static_cast<std::size_t>(padded);
+  for (auto* column : {&x, &y, &z, &vx, &vy, &vz, &ux, &uy, &uz}) column->assign(size, 0.0);
+  for (auto* column : {&radius, &inverse_radius, &mass, &inverse_mass}) column->assign(equal ? 0 : size, 1.0);
+  rows.assign(size * row_size, 0.0);
+  rank.assign(size, -1);
+  place.assign(static_cast<std::size_t>(n), 0);
+  image.assign(2 * size, 0);
+  id_of_rank.assign(static_cast<std::size_t>(n), 0);
+}
+
+namespace {
+template <class Array>
+void reorder(Array& column, const std::vector<std::int32_t>& order, std::vector<double>& scratch) {
+  for (std::size_t k = 0; k < order.size(); ++k) scratch[k] = column[static_cast<std::size_t>(order[k])];
+  for (std::size_t k = 0; k < order.size(); ++k) column[k] = scratch[k];
+}
+}  // namespace
+
+void Particles::permute(const std::vector<std::int32_t>& order) {
+  std::vector<double> scratch(order.size());
+  for (auto* column : {&x, &y, &z, &vx, &vy, &vz, &ux, &uy, &uz}) reorder(*column, order, scratch);
+  if (!equal)
+    for (auto* column : {&radius, &inverse_radius, &mass, &inverse_mass}) reorder(*column, order, scratch);
+  std::vector<std::int32_t> ranks(order.size()), images(2 * order.size());
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const auto from = static_cast<std::size_t>(order[k]);
+    ranks[k] = rank[from];
+    images[2 * k] = image[2 * from];
+    images[2 * k + 1] = image[2 * from + 1];
+  }
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    rank[k] = ranks[k];
+    image[2 * k] = images[2 * k];
+    image[2 * k + 1] = images[2 * k + 1];
+    place[static_cast<std::size_t>(ranks[k])] = static_cast<std::int32_t>(k);
+  }
+  write_rows();
+}
+
+void Particles::write_rows() {
+  for (std::size_t k = 0; k < static_cast<std::size_t>(padded); ++k) {
+    double* row = rows.data() + row_size * k;
+    const double R = equal ? common_radius : radius[k];
+    row[0] = x[k], row[1] = y[k], row[2] = z[k], row[3] = R;
+    row[4] = vx[k], row[5] = vy[k], row[6] = vz[k], row[7] = equal ? common_mass : mass[k];
+    row[8] = ux[k], row[9] = uy[k], row[10] = uz[k], row[11] = 1.0 / R;
+  }
+}
+
+}  // namespace platen

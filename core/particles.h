@@ -1,0 +1,41 @@
+// The state of the spheres: a structure of arrays along a Morton curve [docs/architecture.md, "Data"].
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/aligned.h"
+
+namespace platen {
+
+struct Particles {
+  std::int32_t count = 0;   // N
+  std::int32_t padded = 0;  // N rounded up to whole vectors; the rest rests at the origin and touches nothing
+  bool equal = true;        // one radius and one mass: no columns for them
+
+  // What a step needs.
+  AlignedArray<double> x, y, z;     // [m], wrapped into a periodic box
+  AlignedArray<double> vx, vy, vz;  // half-step velocity [m/s]
+  AlignedArray<double> ux, uy, uz;  // R omega at the half step [m/s]
+  AlignedArray<double> radius, inverse_radius, mass, inverse_mass;  // [m, 1/m, kg, 1/kg]; empty where equal
+  AlignedArray<double> rows;        // copies in the shape that contacts fetch, kernels/views.h
+  double common_radius = 0.0, common_mass = 0.0;
+
+  // What it does not.
+  std::vector<std::int32_t> rank;   // place of each particle in the order of ids
+  std::vector<std::int32_t> place;  // the inverse: where the particle of a rank stands now
+  AlignedArray<std::int32_t> image; // 2 per particle: box lengths left behind in x and y
+  std::vector<std::int64_t> id_of_rank;
+
+  double radius_of(std::int32_t p) const { return equal ? common_radius : radius[static_cast<std::size_t>(p)]; }
+  double mass_of(std::int32_t p) const { return equal ? common_mass : mass[static_cast<std::size_t>(p)]; }
+
+  void resize(std::int32_t n, bool equal_spheres);
+  void permute(const std::vector<std::int32_t>& order);  // order[new place] = old place
+  void write_rows();                                     // rows from the arrays
+};
+
+// Mass of a sphere, 4/3 pi R^3 rho [kg].
+double sphere_mass(double R, double rho);
+
+}  // namespace platen

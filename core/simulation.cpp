@@ -1,0 +1,412 @@
+// Setting up and stepping; lists are in simulation_lists.cpp, measurements in simulation_measures.cpp.
+#include "core/simulation.h"
+
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <numeric>
+
+#include "core/float_mode.h"
+#include "core/simulation_detail.h"
+
+namespace platen {
+
+Simulation::Workers::Workers(int threads)
+    : control(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads)), arena(threads) {}
+
+Simulation::Simulation(SimulationSetup setup)
+    : pair_(setup.pair),
+      plate_parameters_(setup.plate),
+      engine_(setup.engine),
+      width_(setup.width),
+      depth_(setup.depth),
+      gravity_(setup.gravity),
+      saved_(std::make_unique<Saved>()) {
+  const FloatMode mode;
+  if (setup.periodic) domain_ = {setup.width, setup.depth};
+  setup_particles(setup.spheres);
+  setup_laws(setup);
+  if (engine_.executor == Executor::automatic)
+    engine_.executor = engine_.threads > 1 ? Executor::flow_graph : Executor::serial;
+  if (engine_.executor == Executor::flow_graph) workers_ = std::make_unique<Workers>(engine_.threads);
+}
+
+Simulation::~Simulation() {
+  // The graph belongs to the arena that it was built in.
+  graph_.reset();
+}
+
+void Simulation::setup_particles(const SphereTable& table) {
+  const std::size_t n = table.id.size();
+  std::vector<std::size_t> order(n);  // by id
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return table.id[a] < table.id[b]; });
+  bool equal = true;
+  for (std::size_t k = 1; k < n; ++k)
+    equal = equal && table.radius[k] == table.radius[0] && table.density[k] == table.density[0];
+  const bool wide = engine_.scene >= 0 && !built_scenes[static_cast<std::size_t>(engine_.scene)].traits.equal_spheres;
+  const Exponent exponent = pair_.exponent == 1.0 ? Exponent::one : pair_.exponent == 1.5 ? Exponent::three_halves : Exponent::any;
+  SceneTraits needed;
+  needed.exponent = exponent;
+  needed.adhesion = pair_.k_adh > 0.0 || pair_.f0 != 0.0;
+  needed.plasticity = pair_.k2 > pair_.k1;
+  needed.rolling = pair_.rolling_friction == 0.0                      ? Rolling::none
+                   : pair_.rolling_model == RollingModel::absolute ? Rolling::absolute
+                                                                   : Rolling::relative;
+  needed.equal_spheres = equal && !wide;
+  needed.energy = engine_.energy;
+  KernelRequest request;
+  request.needed = needed;
+  request.rolling = true;
+  request.reproducible = engine_.reproducible;
+  request.scene = engine_.scene;
+  kernels_ = choose_kernels(engine_.instruction_set, request);
+  // A scene for unequal spheres reads columns, even where they are all the same.
+  const bool columns = !built_scenes[static_cast<std::size_t>(kernels_.scene)].traits.equal_spheres;
+
+  particles_.resize(static_cast<std::int32_t>(n), !columns);
+  largest_radius_ = 0.0;
+  smallest_radius_ = smallest_mass_ = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < n; ++k) {
+    const std::size_t from = order[k];
+    const double R = table.radius[from], m = sphere_mass(R, table.density[from]);
+    largest_radius_ = std::max(largest_radius_, R);
+    smallest_radius_ = std::min(smallest_radius_, R);
+    smallest_mass_ = std::min(smallest_mass_, m);
+    particles_.id_of_rank[k] = table.id[from];
+    particles_.rank[k] = particles_.place[k] = static_cast<std::int32_t>(k);
+    double x = table.position[3 * from], y = table.position[3 * from + 1];
+    if (domain_.width > 0.0) {  // a caller may pass unwrapped positions
+      const auto wrap = [&](double& c, double length, std::size_t axis) {
+        const double boxes = std::floor(c / length);
+        particles_.image[2 * k + axis] = static_cast<std::int32_t>(boxes);
+        c -= boxes * length;
+        if (c >= length) c = 0.0;
+      };
+      wrap(x, domain_.width, 0), wrap(y, domain_.depth, 1);
+    }
+    particles_.x[k] = x, particles_.y[k] = y, particles_.z[k] = table.position[3 * from + 2];
+    if (!table.velocity.empty())
+      particles_.vx[k] = table.velocity[3 * from], particles_.vy[k] = table.velocity[3 * from + 1],
+      particles_.vz[k] = table.velocity[3 * from + 2];
+    if (!table.spin.empty())
+      particles_.ux[k] = R * table.spin[3 * from], particles_.uy[k] = R * table.spin[3 * from + 1],
+      particles_.uz[k] = R * table.spin[3 * from + 2];
+    if (columns) {
+      particles_.radius[k] = R, particles_.inverse_radius[k] = 1.0 / R;
+      particles_.mass[k] = m, particles_.inverse_mass[k] = 1.0 / m;
+    }
+    particles_.common_radius = R, particles_.common_mass = m;
+  }
+  for (std::int32_t k = 0; k < particles_.count; ++k) {
+    const double R = table.radius[order[static_cast<std::size_t>(k)]];
+    solid_volume_ += sphere_mass(R, 1.0);
+  }
+  particles_.write_rows();
+}
+
+void Simulation::setup_laws(const SimulationSetup& setup) {
+  const double R = largest_radius_, m = particles_.common_mass, n = pair_.exponent;
+  const double heaviest = [&] {
+    double largest = m;
+    for (std::int32_t k = 0; k < particles_.count; ++k) largest = std::max(largest, particles_.mass_of(k));
+    return largest;
+  }();
+  const auto damping = [](double e) {
+    if (e >= 1.0) return 0.0;
+    const double ratio = 3.14159265358979323846 / std::log(e);
+    return 1.0 / (1.0 + ratio * ratio);  // z
+  };
+  LawConstants& c = law_;
+  c.k1 = pair_.k1, c.k2 = pair_.k2, c.k_adh = pair_.k_adh, c.f0 = pair_.f0, c.exponent = n;
+  c.sp_lower = 1.0 - c.k1 / c.k2;
+  c.sp_upper = 1.0 + c.k_adh / c.k2;
+  c.mu = pair_.friction, c.mu_r = pair_.rolling_friction;
+  c.ratio = pair_.tangential_ratio;
+  c.k_t = c.ratio * c.k1;
+  c.half_over_k_t = c.k_t > 0.0 ? 0.5 / c.k_t : 0.0;
+  c.damping = 4.0 * damping(pair_.restitution) * ((n + 1.0) / (2.0 * n));
+  c.beta_ratio = std::sqrt(c.ratio);
+  c.beta_n = std::sqrt(c.damping * ((m * m) / (m + m)) * c.k1);
+  c.overlap_floor = n < 1.0 ? 1e-3 * smallest_radius_ : 0.0;
+  const double power = (n + 1.0) / n;
+  c.plastic_loading = c.sp_lower > 0.0 ? c.k2 * (std::pow(c.sp_lower, -1.0 / n) - 1.0) / power : 0.0;
+  c.plastic_adhesive = c.k2 * (std::pow(c.sp_upper, -1.0 / n) - 1.0) / power;
+  c.radius = particles_.common_radius, c.inverse_radius = 1.0 / particles_.common_radius;
+  c.width = domain_.width, c.depth = domain_.depth;
+  c.inverse_width = c.width > 0.0 ? 1.0 / c.width : 0.0;
+  c.inverse_depth = c.depth > 0.0 ? 1.0 / c.depth : 0.0;
+
+  // Most contacts of a sphere, a power of two from the size ratio: 3.6 (1 + ratio)^2 touch a large one.
+  const double ratio = largest_radius_ / smallest_radius_;
+  const double most = ratio == 1.0 ? 16.0 : power_of_two_above(3.6 * (1.0 + ratio) * (1.0 + ratio));
+  c.rolling_share = 2.0 / most;
+
+  // The largest credible contribution of a pair: the k2 branch at an overlap of R/2 plus damping at the speed R omega.
+  // Every factor scales exactly under a similarity with powers of two.
+  const double deep = 0.5 * R, s = std::pow(deep, n), slope = n * c.k2 * std::pow(deep, n - 1.0);
+  const double fastest = R * std::sqrt(slope / heaviest);
+  const double beta = std::sqrt(c.damping * (0.5 * heaviest) * (n * c.k1 * std::pow(deep, n - 1.0)));
+  const double F = power_of_two_above(c.k2 * s + std::fabs(c.f0) + beta * fastest);
+  c.force = {1.5 * 0x1p52 * (F * most * 0x1p-53), F, 1.0 / (F * most * 0x1p-53)};
+  const double E = power_of_two_above(F * R), q = E * chunk_size * 0x1p-53;
+  c.energy = {1.5 * 0x1p52 * q, E, 1.0 / q};
+  energy_unit_ = E * 0x1p-60;
+
+  PlateConstants& p = plate_law_;
+  const double nu_s = plate_parameters_.particle_poisson_ratio, nu_p = plate_parameters_.poisson_ratio;
+  const double E_s = plate_parameters_.particle_young_modulus, E_p = plate_parameters_.young_modulus;
+  const double G_s = E_s / (2.0 * (1.0 + nu_s)), G_p = E_p / (2.0 * (1.0 + nu_p));
+  const double E_star = 1.0 / ((1.0 - nu_s * nu_s) / E_s + (1.0 - nu_p * nu_p) / E_p);
+  const double G_star = 1.0 / ((2.0 - nu_s) / G_s + (2.0 - nu_p) / G_p);
+  p.hertz = 4.0 / 3.0 * E_star;
+  p.stiffness_n = 2.0 * E_star;
+  p.stiffness_t = 8.0 * G_star;
+  p.damping = 4.0 * (5.0 / 6.0) * damping(plate_parameters_.restitution);
+  p.mu = plate_parameters_.friction, p.mu_r = plate_parameters_.rolling_friction;
+  p.slip_ratio = p.mu * p.hertz / p.stiffness_t;
+  const double plate_slope = p.stiffness_n * std::sqrt(R * deep);
+  const double plate_speed = R * std::sqrt(plate_slope / heaviest);
+  const double F_p = power_of_two_above(p.hertz * std::sqrt(R * deep) * deep +
+                                        std::sqrt(p.damping * heaviest * plate_slope) * plate_speed);
+  p.force = {0.0, F_p, 0.0};
+  p.energy = c.energy;
+  p.energy.bound = power_of_two_above(F_p * R);
+  plate_force_unit_ = F_p * 0x1p-60;
+
+  motion_.gravity = setup.gravity;
+  motion_.mu_r = pair_.rolling_model == RollingModel::absolute ? pair_.rolling_friction : 0.0;
+  motion_.mass = particles_.common_mass, motion_.inverse_mass = 1.0 / particles_.common_mass;
+  motion_.radius = particles_.common_radius, motion_.inverse_radius = 1.0 / particles_.common_radius;
+  motion_.width = domain_.width, motion_.depth = domain_.depth;
+  motion_.energy = c.energy;
+}
+
+double Simulation::time() const { return time_base_ + static_cast<double>(step_ - step_base_) * dt_; }
+
+void Simulation::set_time_step(double dt) {
+  if (dt == dt_) return;
+  time_base_ = time(), step_base_ = step_;
+  for (PlaneMotion& plane : planes_) {
+    if (!plane.present) continue;
+    const double elapsed = static_cast<double>(step_ - plane.start) * plane.dt;
+    plane.origin += plane.velocity * elapsed;
+    plane.vibrated += elapsed;
+    plane.start = step_, plane.dt = dt;
+  }
+  dt_ = dt;
+}
+
+void Simulation::set_plane(int plate, PlaneMotion motion) {
+  motion.present = true, motion.start = step_, motion.dt = dt_;
+  planes_[static_cast<std::size_t>(plate)] = motion;
+  lists_valid_ = false, forces_valid_ = false;
+}
+
+void Simulation::set_plane_velocity(int plate, double velocity) {
+  PlaneMotion& plane = planes_[static_cast<std::size_t>(plate)];
+  plane.origin = plane.position_at(step_);
+  plane.amplitude = 0.0;
+  plane.velocity = velocity, plane.start = step_, plane.dt = dt_;
+}
+
+void Simulation::remove_plane(int plate) {
+  FixedSum stored(energy_unit_);
+  for (const Batch& batch : batches_) add_plate_energy(batch.plates[plate], plate_law_, stored, particles_);
+  removed_ += stored.value();
+  planes_[static_cast<std::size_t>(plate)].present = false;
+  lists_valid_ = false, forces_valid_ = false;
+}
+
+double Simulation::plane_position(int plate) const { return planes_[static_cast<std::size_t>(plate)].position_at(step_); }
+
+void Simulation::parallel(int count, const std::function<void(int)>& body) {
+  const auto one = [&](int k) {
+    const FloatMode mode;
+    body(k);
+  };
+  if (!workers_ || count < 2) {
+    for (int k = 0; k < count; ++k) one(k);
+    return;
+  }
+  workers_->arena.execute([&] { tbb::parallel_for(0, count, [&](int k) { one(k); }); });
+}
+
+// Adds the halo slots of other batches and the plates' forces to the sums of a batch. Pair sums are exact in any order;
+// plates are added to the finished sum in the order of planes.
+void Simulation::merge(Batch& b) {
+  for (const Incoming& in : b.incoming) {
+    const double* from = batches_[static_cast<std::size_t>(in.batch)].sum_j.data() + record_size * static_cast<std::size_t>(in.slot);
+    double* to = b.sum_j.data() + record_size * static_cast<std::size_t>(in.local);
+    for (int k = 0; k < record_size; ++k) to[k] += from[k];
+  }
+  for (const PlateList& list : b.plates) {
+    for (std::size_t m = 0; m < static_cast<std::size_t>(list.used); ++m) {
+      if (!(list.overlap[m] > 0.0)) continue;
+      const auto at = record_size * static_cast<std::size_t>(list.particle[m] - b.first);
+      double *sum_i = b.sum_i.data() + at, *sum_j = b.sum_j.data() + at;
+      const double* record = list.records.data() + record_size * m;
+      for (int k = 0; k < record_size; ++k) {
+        sum_j[k] = (sum_i[k] + sum_j[k]) + record[k];
+        sum_i[k] = 0.0;
+      }
+    }
+  }
+}
+
+void Simulation::integrate(Batch& b, const MotionConstants& c) {
+  const auto index = static_cast<std::size_t>(&b - batches_.data());
+  if (!merged_[index]) merge(b);
+  Particles& p = particles_;
+  const auto first = static_cast<std::size_t>(b.first);
+  const auto column = [&](AlignedArray<double>& a) { return a.empty() ? nullptr : a.data() + first; };
+  const MotionBatch batch{column(p.x), column(p.y), column(p.z), column(p.vx), column(p.vy), column(p.vz), column(p.ux),
+                          column(p.uy), column(p.uz), column(p.inverse_mass), column(p.mass), column(p.radius),
+                          column(p.inverse_radius), p.rows.data() + row_size * first, p.image.data() + 2 * first,
+                          b.sum_i.data(), b.sum_j.data(), b.count};
+  MotionTotals totals;
+  kernels_.motion(batch, c, totals);
+  // The places that fill up the last vector rest where they are.
+  for (auto k = static_cast<std::size_t>(p.count); k < first + static_cast<std::size_t>(b.count); ++k) {
+    for (auto* a : {&p.x, &p.y, &p.z, &p.vx, &p.vy, &p.vz, &p.ux, &p.uy, &p.uz}) (*a)[k] = 0.0;
+    p.image[2 * k] = p.image[2 * k + 1] = 0;
+  }
+  b.largest_speed = std::sqrt(totals.largest_speed2);
+  b.path += b.largest_speed * c.drift;
+  b.rolling += totals.rolling;
+  b.out_of_range = b.out_of_range || totals.out_of_range;
+}
+
+void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law) {
+  merged_[static_cast<std::size_t>(&b - batches_.data())] = 0;
+  std::memset(b.sum_j.data(), 0, b.sum_j.size() * sizeof(double));
+  const PairBatch pairs{particles_.rows.data(), b.i.data(), b.j.data(), b.slot_j.data(), b.sp.data(), b.tx.data(),
+                        b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum_i.data(),
+                        b.sum_j.data(), b.first, b.padded};
+  b.pair_totals.contacts = 0;
+  kernels_.contacts(pairs, law, b.pair_totals);
+  b.out_of_range = b.out_of_range || b.pair_totals.out_of_range;
+  for (int plate = 0; plate < plate_count; ++plate) {
+    PlateList& list = b.plates[plate];
+    if (list.used == 0) continue;
+    Plane plane = plane_shape(plate);
+    plane.position = planes_[static_cast<std::size_t>(plate)].position_at(step);
+    plane.velocity = planes_[static_cast<std::size_t>(plate)].velocity_at(step);
+    const PlateBatch batch{particles_.rows.data(), list.particle.data(), list.xi_x.data(), list.xi_y.data(),
+                           list.xi_z.data(), list.stiffness_last.data(), list.records.data(), list.overlap.data(),
+                           list.padded, list.used};
+    PlateTotals totals;
+    kernels_.plates(batch, plane, plate_law, totals);
+    for (int term = 0; term < term_count; ++term) b.plate_energy[term] += totals.energy[term];
+    b.plate_work += totals.work;
+    b.out_of_range = b.out_of_range || totals.out_of_range;
+  }
+}
+
+void Simulation::run_task(const Task& task) {
+  const FloatMode mode;
+  Batch& b = batches_[static_cast<std::size_t>(task.batch)];
+  if (task.kind != TaskKind::contacts) integrate(b, task.offset == 0 ? first_motion_ : motion_);
+  if (task.kind != TaskKind::integrate) contacts(b, step_ + task.offset + 1, law_, plate_law_);
+}
+
+// Forces at the present step without advancing springs: after something other than motion changed.
+void Simulation::ensure_forces() {
+  if (!lists_valid_) rebuild();
+  if (forces_valid_) return;
+  const FloatMode mode;
+  LawConstants law = law_;
+  PlateConstants plate_law = plate_law_;
+  law.dt = plate_law.dt = 0.0;
+  parallel(static_cast<int>(batches_.size()), [&](int k) { contacts(batches_[static_cast<std::size_t>(k)], step_, law, plate_law); });
+  collect();
+  forces_valid_ = true;
+  bool bad = false;
+  for (const Batch& b : batches_) bad = bad || b.out_of_range;
+  if (bad) fail("forces out of range");
+}
+
+void Simulation::collect() {
+  contacts_ = 0;
+  for (Batch& b : batches_) {
+    contacts_ += b.pair_totals.contacts;
+    for (int term = 0; term < term_count; ++term) {
+      dissipated_[term] += b.pair_totals.energy[term] + b.plate_energy[term];
+      b.pair_totals.energy[term] = b.plate_energy[term] = 0;
+    }
+    rolling_ += b.rolling;
+    plate_work_ += b.plate_work;
+    b.rolling = b.plate_work = 0;
+  }
+}
+
+void Simulation::run_chunk(int steps) {
+  for (Batch& b : batches_) b.path = 0.0;
+  law_.dt = plate_law_.dt = dt_;
+  motion_.kick = motion_.drift = dt_;
+  motion_.mean_x = mean_[0], motion_.mean_y = mean_[1], motion_.mean_z = mean_[2];
+  first_motion_ = motion_;
+  first_motion_.kick = 0.5 * (last_drift_ + dt_);
+  const TaskBody body = [this](const Task& task) { run_task(task); };
+  switch (engine_.executor) {
+    case Executor::flow_graph: workers_->arena.execute([&] { graph_->run(steps); }); break;
+    case Executor::plain_threads: run_on_plain_threads(*table_, steps, body, engine_.threads); break;
+    default: run_serially(*table_, steps, body); break;
+  }
+}
+
+void Simulation::prepare_graph() {
+  if (table_) return;
+  graph_.reset();
+  table_ = std::make_unique<TaskTable>(batches_, unroll_, engine_.fused);
+  if (engine_.executor == Executor::flow_graph)
+    workers_->arena.execute([&] { graph_ = std::make_unique<FlowGraph>(*table_, [this](const Task& task) { run_task(task); }); });
+}
+
+void Simulation::advance(std::int64_t steps) {
+  const FloatMode mode;
+  ensure_forces();
+  while (steps > 0) {
+    const int n = prepare_lists(steps);
+    save();
+    run_chunk(n);
+    double path = 0.0;
+    bool bad = false;
+    largest_speed_ = 0.0;
+    for (const Batch& b : batches_) {
+      path = std::max(path, b.path);
+      largest_speed_ = std::max(largest_speed_, b.largest_speed);
+      bad = bad || b.out_of_range;
+    }
+    // Were the lists wide enough? If not, a pair may have been missed, and a force out of range may be its consequence:
+    // from the saved state once more with wider lists. Lists change no bits, so nobody sees it.
+    const double planes = plane_moved_ + plane_path(n);
+    if (std::isfinite(path) && !(2.0 * (moved_ + path) <= gap_ && moved_ + path + planes <= plate_gap_)) {
+      restore();
+      counters_.redone_steps += n;
+      largest_speed_ = 1.25 * std::max(largest_speed_, path / (n * dt_));
+      lists_stale_ = true;
+      continue;
+    }
+    if (bad || !std::isfinite(path)) {
+      step_ += n;
+      fail("forces or velocities out of range");
+    }
+    collect();
+    step_ += n;
+    steps -= n;
+    last_drift_ = dt_;
+    for (int axis = 0; axis < 3; ++axis) {
+      drift_at_rebuild_[axis] += mean_[axis] * (n * dt_);
+      drift_at_prune_[axis] += mean_[axis] * (n * dt_);
+    }
+    plane_moved_ += plane_path(n);
+  }
+}
+
+}  // namespace platen

@@ -1,0 +1,205 @@
+// A bed of spheres between planes, advanced step by step. The library behind the experiment: it knows nothing of case
+// files, stages or output.
+//
+// The state is always that right after the forces of step n were found: positions at n, velocities at n - 1/2, history
+// and forces at n. One step is then: kick and drift to n + 1 (integrate), forces at n + 1 (contacts).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "core/batches.h"
+#include "core/contacts.h"
+#include "core/fixed_sum.h"
+#include "core/measures.h"
+#include "core/neighbours.h"
+#include "core/particles.h"
+#include "core/plates.h"
+#include "core/stability.h"
+#include "kernels/kernel_table.h"
+#include "kernels/law_parameters.h"
+
+namespace platen {
+
+// A run that cannot go on: not a number, overlap above R, force out of range, lost particle. Names step, ids, positions.
+class RunError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+struct SphereTable {
+  std::vector<std::int64_t> id;    // unique
+  std::vector<double> position;    // N x 3 [m]
+  std::vector<double> velocity;    // N x 3 [m/s] at the start; may be empty: at rest
+  std::vector<double> spin;        // N x 3 [rad/s]; may be empty
+  std::vector<double> radius;      // N [m]
+  std::vector<double> density;     // N [kg/m3]
+};
+
+enum class Executor { automatic, serial, flow_graph, plain_threads };
+
+struct EngineOptions {
+  double skin = 0.0;        // [m]; 0 = chosen
+  double inner_gap = 0.0;   // [m]; 0 = chosen
+  int batch = 0;            // particles; 0 = chosen
+  int threads = 1;
+  int unroll = 32;          // most steps between two looks at the lists
+  bool reproducible = false;
+  bool energy = true;
+  int scene = -1;           // a built scene by number; -1: the cheapest that covers the case
+  InstructionSet instruction_set = InstructionSet::scalar;
+  Executor executor = Executor::automatic;
+  bool fused = false;       // one task per batch and step instead of two
+};
+
+struct SimulationSetup {
+  PairLaw pair;
+  PlateLaw plate;
+  SphereTable spheres;
+  double gravity = 9.81;    // along -z [m/s2]
+  double width = 0.0, depth = 0.0;  // of the box [m]; 0 where there is none
+  bool periodic = false;
+  bool plates_roll = true;  // planes may be present, so their rolling friction counts for the choice of kernels
+  EngineOptions engine;
+};
+
+struct EngineCounters {
+  std::int64_t rebuilds = 0, prunes = 0, redone_steps = 0;
+  int batches = 0;
+  double skin = 0.0, gap = 0.0;
+  std::int64_t bytes = 0;   // of the large arrays
+};
+
+class Simulation {
+ public:
+  explicit Simulation(SimulationSetup setup);
+  ~Simulation();
+
+  std::int64_t step() const { return step_; }
+  double time() const;
+  double time_step() const { return dt_; }
+  void set_time_step(double dt);
+
+  // Planes. Moving a plane starts at the present step; planes that carry contacts keep them.
+  void set_plane(int plate, PlaneMotion motion);
+  void remove_plane(int plate);
+  void set_plane_velocity(int plate, double velocity);  // from the next step on; ends a vibration
+  const PlaneMotion& plane(int plate) const { return planes_[static_cast<std::size_t>(plate)]; }
+  double plane_position(int plate) const;
+
+  // Takes the periodic sides away: pairs across a face are deleted, every sphere stays where it is [A32].
+  void open_sides();
+  bool periodic() const { return domain_.width > 0.0; }
+
+  void advance(std::int64_t steps);
+
+  Measures measure();
+  // stress on top and bottom alone [Pa]; cheaper than measure().
+  double stress(int plate);
+  Snapshot snapshot(bool with_contacts = true);
+  // XXH3 over positions, half-step velocities, u, images in id order, then touching contacts sorted by ids with their
+  // history, then `extra` (the state of the stage).
+  std::uint64_t state_hash(const std::string& extra = {});
+  // Limits of the time step from the present contact network; undamped and damped.
+  StepLimits step_limits();
+
+  // Energy of what is there now counts as inserted: called once when filling is done.
+  void count_inserted();
+
+  std::int32_t particles() const { return particles_.count; }
+  double area() const { return width_ * depth_; }
+  const KernelTable& kernels() const { return kernels_; }
+  const EngineCounters& counters() const { return counters_; }
+  double largest_radius() const { return largest_radius_; }
+  double smallest_radius() const { return smallest_radius_; }
+  double smallest_mass() const { return smallest_mass_; }
+
+  // For tests and benches: the lists and tasks as they are.
+  const std::vector<Batch>& batches() const { return batches_; }
+  const Particles& state() const { return particles_; }
+  const LawConstants& law() const { return law_; }
+  const PlateConstants& plate_law() const { return plate_law_; }
+  void rebuild_now();
+  void ensure_forces();
+
+ private:
+  struct Saved;
+  void setup_particles(const SphereTable& spheres);
+  void setup_laws(const SimulationSetup& setup);
+  void merge(Batch& batch);
+  void integrate(Batch& batch, const MotionConstants& c);
+  void contacts(Batch& batch, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law);
+  void run_task(const Task& task);
+  void collect();
+  void rebuild();
+  void rebuild_with(std::vector<PairHistory> pairs);
+  void prune_lists();
+  void keep_sums(AlignedArray<double>& sums);
+  void put_sums(const AlignedArray<double>& sums);
+  double displaced(const AlignedArray<double>& reference, const double (&drift)[3]);
+  void remember(AlignedArray<double>& reference, double (&drift)[3]);
+  int prepare_lists(std::int64_t wanted);
+  double plane_path(int steps) const;
+  void run_chunk(int steps);
+  void save();
+  void restore();
+  void mean_velocity();
+  void parallel(int count, const std::function<void(int)>& body);
+  [[noreturn]] void fail(const std::string& what);
+  void prepare_graph();
+  void add_pair_energy(FixedSum& sum) const;
+
+  PairLaw pair_;
+  PlateLaw plate_parameters_;
+  EngineOptions engine_;
+  double width_ = 0.0, depth_ = 0.0, gravity_ = 0.0;
+  Domain domain_;
+  Particles particles_;
+  Planes planes_;
+  std::vector<Batch> batches_;
+  KernelTable kernels_;
+  LawConstants law_{};
+  PlateConstants plate_law_{};
+  MotionConstants motion_{};
+  double solid_volume_ = 0.0;      // of all spheres [m3]
+  double energy_unit_ = 0.0;       // of stored and kinetic energies [J]
+  double plate_force_unit_ = 0.0;  // [N]
+  double largest_radius_ = 0.0, smallest_radius_ = 0.0, smallest_mass_ = 0.0;
+
+  std::int64_t step_ = 0;
+  double dt_ = 0.0, last_drift_ = 0.0;
+  std::int64_t step_base_ = 0;  // time = time_base_ + (step - step_base_) dt
+  double time_base_ = 0.0;
+  bool lists_valid_ = false, forces_valid_ = false;
+
+  // Integrals since the start, in energy quanta.
+  __int128 dissipated_[term_count] = {}, rolling_ = 0, plate_work_ = 0;
+  std::int64_t contacts_ = 0;  // touching sphere pairs
+  double inserted_ = 0.0, removed_ = 0.0;
+
+  // Lists.
+  double skin_ = 0.0, gap_ = 0.0, plate_gap_ = 0.0;
+  AlignedArray<double> at_rebuild_, at_prune_;  // positions then, 3 per particle
+  double mean_[3] = {0, 0, 0};                  // common velocity taken out of displacements [m/s]
+  double drift_at_rebuild_[3] = {0, 0, 0};      // displacement by mean_ since the rebuild [m]
+  double drift_at_prune_[3] = {0, 0, 0};
+  double largest_speed_ = 0.0;   // relative to mean_, last step [m/s]
+  double moved_ = 0.0;           // largest displacement since the prune, at the start of the chunk [m]
+  double plane_moved_ = 0.0;     // bound of the planes' motion since the prune [m]
+  bool lists_stale_ = false;     // prune before the next step
+  int unroll_ = 1;               // steps of the graph
+
+  std::unique_ptr<TaskTable> table_;
+  std::unique_ptr<FlowGraph> graph_;
+  struct Workers;
+  std::unique_ptr<Workers> workers_;
+  std::unique_ptr<Saved> saved_;
+  MotionConstants first_motion_{};
+  std::vector<char> merged_;
+  EngineCounters counters_;
+};
+
+}  // namespace platen

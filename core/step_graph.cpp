@@ -1,0 +1,175 @@
+#include "core/step_graph.h"
+
+#include <tbb/flow_graph.h>
+
+#include <algorithm>
+#include <thread>
+
+namespace platen {
+
+const char* to_string(TaskKind kind) {
+  switch (kind) {
+    case TaskKind::integrate: return "integrate";
+    case TaskKind::contacts: return "contacts";
+    case TaskKind::step: return "step";
+  }
+  return "?";
+}
+
+std::vector<Access> TaskTable::accesses(const Task& task) const {
+  const auto at = [](int batch, Resource what) { return batch * resource_count + what; };
+  const int b = task.batch;
+  std::vector<Access> list;
+  if (task.kind != TaskKind::contacts) {
+    for (int owner : owners_[static_cast<std::size_t>(b)]) list.push_back({at(owner, resource_halo), false});
+    list.push_back({at(b, resource_history), false});  // plate forces
+    list.push_back({at(b, resource_sums), true});      // halo slots and plate forces are added in
+    list.push_back({at(b, resource_state), true});
+    list.push_back({at(b, resource_totals), true});
+  }
+  if (task.kind != TaskKind::integrate) {
+    list.push_back({at(b, resource_state), false});
+    for (int partner : partners_[static_cast<std::size_t>(b)]) list.push_back({at(partner, resource_state), false});
+    for (Resource what : {resource_history, resource_sums, resource_halo, resource_totals})
+      list.push_back({at(b, what), true});
+  }
+  return list;
+}
+
+TaskTable::TaskTable(const std::vector<Batch>& batches, int steps, bool fused) : steps_(steps), fused_(fused) {
+  const int count = static_cast<int>(batches.size());
+  for (const Batch& batch : batches) partners_.push_back(batch.partners), owners_.push_back(batch.owners);
+  // Fused, a batch's contacts need the positions of its partners, which have higher colours: those go first.
+  std::vector<int> order(batches.size());
+  for (int b = 0; b < count; ++b) order[static_cast<std::size_t>(b)] = b;
+  if (fused)
+    std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+      return batches[static_cast<std::size_t>(a)].colour > batches[static_cast<std::size_t>(b)].colour;
+    });
+  for (int offset = 0; offset < steps; ++offset) {
+    if (fused) {
+      for (int b : order) tasks_.push_back({TaskKind::step, b, offset});
+    } else {
+      for (int b : order) tasks_.push_back({TaskKind::integrate, b, offset});
+      for (int b : order) tasks_.push_back({TaskKind::contacts, b, offset});
+    }
+  }
+
+  const auto resources = static_cast<std::size_t>(count) * resource_count;
+  std::vector<std::int32_t> writer(resources, -1);
+  std::vector<std::vector<std::int32_t>> readers(resources);
+  successors_.resize(tasks_.size());
+  predecessors_.assign(tasks_.size(), 0);
+  std::vector<std::int32_t> before;
+  for (std::size_t t = 0; t < tasks_.size(); ++t) {
+    const auto list = accesses(tasks_[t]);
+    before.clear();
+    for (const Access& access : list) {
+      const auto r = static_cast<std::size_t>(access.resource);
+      if (writer[r] >= 0) before.push_back(writer[r]);
+      if (access.writes) before.insert(before.end(), readers[r].begin(), readers[r].end());
+    }
+    // A doubled edge would make a flow graph wait for ever.
+    std::sort(before.begin(), before.end());
+    before.erase(std::unique(before.begin(), before.end()), before.end());
+    for (std::int32_t p : before) {
+      if (p == static_cast<std::int32_t>(t)) continue;
+      successors_[static_cast<std::size_t>(p)].push_back(static_cast<std::int32_t>(t));
+      ++predecessors_[t];
+    }
+    for (const Access& access : list) {
+      const auto r = static_cast<std::size_t>(access.resource);
+      if (access.writes) {
+        writer[r] = static_cast<std::int32_t>(t);
+        readers[r].clear();
+      }
+    }
+    for (const Access& access : list)
+      if (!access.writes && writer[static_cast<std::size_t>(access.resource)] != static_cast<std::int32_t>(t))
+        readers[static_cast<std::size_t>(access.resource)].push_back(static_cast<std::int32_t>(t));
+  }
+}
+
+void TaskTable::remove_edge(std::int32_t from, std::int32_t to) {
+  auto& list = successors_[static_cast<std::size_t>(from)];
+  const auto it = std::find(list.begin(), list.end(), to);
+  if (it == list.end()) return;
+  list.erase(it);
+  --predecessors_[static_cast<std::size_t>(to)];
+}
+
+std::string TaskTable::to_dot() const {
+  std::string text = "digraph step {\n  rankdir=LR;\n";
+  const auto name = [&](std::size_t t) {
+    return "\"" + std::string(to_string(tasks_[t].kind)) + "(" + std::to_string(tasks_[t].batch) + ") +" +
+           std::to_string(tasks_[t].offset) + "\"";
+  };
+  for (std::size_t t = 0; t < tasks_.size(); ++t)
+    for (std::int32_t next : successors_[t]) text += "  " + name(t) + " -> " + name(static_cast<std::size_t>(next)) + ";\n";
+  return text + "}\n";
+}
+
+void run_serially(const TaskTable& table, int steps, const TaskBody& body) {
+  for (const Task& task : table.tasks()) {
+    if (task.offset >= steps) break;
+    body(task);
+  }
+}
+
+void run_on_plain_threads(const TaskTable& table, int steps, const TaskBody& body, int threads) {
+  const std::size_t count = table.tasks().size();
+  std::vector<std::vector<std::int32_t>> before(count);
+  for (std::size_t t = 0; t < count; ++t)
+    for (std::int32_t next : table.successors()[t]) before[static_cast<std::size_t>(next)].push_back(static_cast<std::int32_t>(t));
+  std::vector<std::atomic<bool>> done(count);
+  for (auto& flag : done) flag.store(false, std::memory_order_relaxed);
+  // Tasks are dealt out in table order, so whoever waits, waits for a task that another thread already has.
+  std::vector<std::thread> team;
+  for (int worker = 0; worker < threads; ++worker) {
+    team.emplace_back([&, worker] {
+      for (std::size_t t = static_cast<std::size_t>(worker); t < count; t += static_cast<std::size_t>(threads)) {
+        if (table.tasks()[t].offset >= steps) break;
+        for (std::int32_t p : before[t])
+          while (!done[static_cast<std::size_t>(p)].load(std::memory_order_acquire)) std::this_thread::yield();
+        body(table.tasks()[t]);
+        done[t].store(true, std::memory_order_release);
+      }
+    });
+  }
+  for (std::thread& thread : team) thread.join();
+}
+
+struct FlowGraph::Graph {
+  using Node = tbb::flow::continue_node<tbb::flow::continue_msg>;
+  tbb::flow::graph graph;
+  std::vector<std::unique_ptr<Node>> nodes;
+  std::vector<Node*> roots;
+  TaskBody body;
+  int steps = 0;
+};
+
+FlowGraph::FlowGraph(const TaskTable& table, TaskBody body) : graph_(std::make_unique<Graph>()) {
+  Graph& g = *graph_;
+  g.body = std::move(body);
+  g.nodes.reserve(table.tasks().size());
+  for (const Task& task : table.tasks()) {
+    g.nodes.push_back(std::make_unique<Graph::Node>(g.graph, [graph = graph_.get(), task](const tbb::flow::continue_msg&) {
+      if (task.offset < graph->steps) graph->body(task);
+      return tbb::flow::continue_msg();
+    }));
+  }
+  for (std::size_t t = 0; t < table.tasks().size(); ++t) {
+    for (std::int32_t next : table.successors()[t]) tbb::flow::make_edge(*g.nodes[t], *g.nodes[static_cast<std::size_t>(next)]);
+    if (table.predecessors()[t] == 0) g.roots.push_back(g.nodes[t].get());
+  }
+}
+
+FlowGraph::~FlowGraph() = default;
+
+void FlowGraph::run(int steps) {
+  graph_->steps = steps;
+  for (Graph::Node* root : graph_->roots) root->try_put(tbb::flow::continue_msg());
+  graph_->graph.wait_for_all();
+}
+
+}  // namespace platen

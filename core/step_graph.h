@@ -1,0 +1,80 @@
+// The tasks of a number of time steps, what each reads and writes, and the order that follows from it.
+//
+// The table is written down once in the order in which one thread would run it. Two tasks that touch the same resource,
+// at least one of them writing, keep that order: edges are derived, nobody writes them. The same table runs serially,
+// as an oneTBB flow graph, or on plain threads that wait on their predecessors' flags (for ThreadSanitizer, which cannot
+// see through an uninstrumented libtbb).
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/batches.h"
+
+namespace platen {
+
+enum class TaskKind : std::uint8_t {
+  integrate,  // reads sums of b, halo slots meant for b, plate forces of b; writes x v u of b
+  contacts,   // reads x v u of b and its partners; writes history, sums and halo slots of b
+  step        // fused: integrate, then contacts
+};
+
+const char* to_string(TaskKind kind);
+
+struct Task {
+  TaskKind kind;
+  int batch;
+  int offset;  // step within the graph
+};
+
+struct Access {
+  int resource;  // batch * resources + what
+  bool writes;
+};
+enum Resource { resource_state, resource_sums, resource_halo, resource_history, resource_totals, resource_count };
+
+class TaskTable {
+ public:
+  TaskTable(const std::vector<Batch>& batches, int steps, bool fused);
+
+  int steps() const { return steps_; }
+  bool fused() const { return fused_; }
+  const std::vector<Task>& tasks() const { return tasks_; }
+  const std::vector<std::vector<std::int32_t>>& successors() const { return successors_; }
+  const std::vector<std::int32_t>& predecessors() const { return predecessors_; }  // their number
+  std::vector<Access> accesses(const Task& task) const;
+  void remove_edge(std::int32_t from, std::int32_t to);  // for tests that must see it missed
+  std::string to_dot() const;                            // Graphviz
+
+ private:
+  int steps_;
+  bool fused_;
+  std::vector<std::vector<int>> partners_, owners_;  // of each batch
+  std::vector<Task> tasks_;
+  std::vector<std::vector<std::int32_t>> successors_;
+  std::vector<std::int32_t> predecessors_;
+};
+
+using TaskBody = std::function<void(const Task&)>;
+
+// Runs the tasks of the first `steps` steps of the table.
+void run_serially(const TaskTable& table, int steps, const TaskBody& body);
+void run_on_plain_threads(const TaskTable& table, int steps, const TaskBody& body, int threads);
+
+// An oneTBB flow graph of the table, built once and run many times. Build and run it inside the arena that shall work.
+class FlowGraph {
+ public:
+  FlowGraph(const TaskTable& table, TaskBody body);
+  ~FlowGraph();
+  void run(int steps);
+
+ private:
+  struct Graph;
+  std::unique_ptr<Graph> graph_;
+};
+
+}  // namespace platen

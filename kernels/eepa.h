@@ -1,0 +1,113 @@
+// Edinburgh elasto-plastic adhesive law between two spheres [Thakur2016, Eq. 1-10; docs/laws.md, "Pairs"].
+//
+//   s = delta^n;  s_p = plastic overlap to the power n, the history
+//   s_p  <- clamp(s_p, (1 - k1/k2) s, (1 + k_adh/k2) s)       loading and adhesive branches [Eq. 2, A2, A3]
+//   f_hys = f0 + k2 (s - s_p)                                  [Eq. 2]
+//   limit = mu |k2 (s - s_p) + k_adh s|                        [Eq. 9, 10, A11]
+//   K1    = n k1 delta^(n-1);  k_t = ratio K1                  [A8]
+//   beta_n^2 = 4 z (n+1)/(2n) m* K1;  beta_t^2 = ratio beta_n^2   [Eq. 4, 7, A8]
+#pragma once
+
+#include "kernels/power.h"
+#include "kernels/scene.h"
+#include "kernels/vec3.h"
+#include "kernels/views.h"
+
+namespace platen {
+
+template <class I>
+struct NormalResponse {
+  typename I::Real sp;       // s_p after the step [m^n]
+  typename I::Real f_hys;    // spring force, positive repels [N]
+  typename I::Real height;   // of f_hys above the adhesive branch: k2 (s - s_p) + k_adh s [N]
+};
+
+template <class I>
+PLATEN_INLINE typename I::Real power_of(typename I::Real x, double p) {
+  alignas(64) double v[I::width];
+  I::store(v, x);
+  for (int lane = 0; lane < I::width; ++lane) v[lane] = power(v[lane], p);
+  return I::load(v);
+}
+
+// s = delta^n for delta >= 0.
+template <class I, Exponent n>
+PLATEN_INLINE typename I::Real overlap_power(typename I::Real delta, const LawConstants& c) {
+  if constexpr (n == Exponent::one)
+    return delta;
+  else if constexpr (n == Exponent::three_halves)
+    return delta * I::sqrt(delta);
+  else
+    return power_of<I>(delta, c.exponent);
+}
+
+// K1 = n k1 delta^(n-1), the slope of the loading branch [N/m].
+template <class I, Exponent n>
+PLATEN_INLINE typename I::Real loading_slope(typename I::Real delta, const LawConstants& c) {
+  if constexpr (n == Exponent::one)
+    return I::set(c.k1);
+  else if constexpr (n == Exponent::three_halves)
+    return I::set(1.5 * c.k1) * I::sqrt(delta);
+  else
+    return I::set(c.exponent * c.k1) * power_of<I>(I::max(delta, I::set(c.overlap_floor)), c.exponent - 1.0);
+}
+
+template <class I, SceneTraits scene>
+PLATEN_INLINE NormalResponse<I> normal_response(typename I::Real s, typename I::Real sp_old, const LawConstants& c) {
+  using Real = typename I::Real;
+  Real sp = I::set(0.0);
+  if constexpr (scene.plasticity) {
+    Real upper = s;
+    if constexpr (scene.adhesion) upper = I::set(c.sp_upper) * s;
+    sp = I::min(I::max(sp_old, I::set(c.sp_lower) * s), upper);
+  }
+  const Real elastic = I::set(c.k2) * (s - sp);
+  Real f_hys = elastic, height = elastic;
+  if constexpr (scene.adhesion) {
+    f_hys = elastic + I::set(c.f0);
+    height = elastic + I::set(c.k_adh) * s;
+  }
+  return {sp, f_hys, height};
+}
+
+template <class I>
+struct TangentialResponse {
+  Vec3<I> spring;                   // T after the step [N]
+  typename I::Mask cut;             // the limit holds: sliding
+  typename I::Real before, after;   // |T|^2 before and after the limit [N2]
+};
+
+// Turns the stored spring into the tangent plane of normal n keeping its length, advances it by -k_t v_t dt, and cuts it
+// back to the limit [Eq. 5, 9, 10].
+template <class I, bool exact>
+PLATEN_INLINE TangentialResponse<I> tangential_response(const Vec3<I>& T_old, const Vec3<I>& n, const Vec3<I>& v_t,
+                                                        typename I::Real k_t, typename I::Real limit, double dt) {
+  using Real = typename I::Real;
+  const Vec3<I> flat = add_scaled<I>(T_old, -dot(T_old, n), n);
+  const Real length2 = dot(T_old, T_old), product = length2 * dot(flat, flat);
+  // length/|flat| = length2 / sqrt(length2 |flat|^2); springs too small to square are left as they are.
+  const Real tiny = I::set(0x1p-900);
+  const Real stretch =
+      I::where(product > tiny, length2 * inverse_sqrt<I, exact>(I::max(product, tiny)), I::set(1.0));
+  const Vec3<I> trial = add_scaled<I>(scale<I>(stretch, flat), -(k_t * I::set(dt)), v_t);
+  const Real trial2 = dot(trial, trial), limit2 = limit * limit;
+  const auto cut = trial2 > limit2;
+  const Real back = I::where(cut, limit * inverse_sqrt<I, exact>(I::max(trial2, tiny)), I::set(1.0));
+  return {scale<I>(back, trial), cut, trial2, I::where(cut, limit2, trial2)};
+}
+
+// Energy that plastic flow takes when s_p goes from `sp_old` to `sp`: a function of s_p alone, hence exact for any step
+// [docs/laws.md, "Energy"].
+template <class I, Exponent n>
+PLATEN_INLINE typename I::Real plastic_dissipation(typename I::Real sp_old, typename I::Real sp, const LawConstants& c) {
+  using Real = typename I::Real;
+  const Real weight = I::where(sp > sp_old, I::set(c.plastic_loading), I::set(c.plastic_adhesive));
+  if constexpr (n == Exponent::one) {
+    return weight * ((sp - sp_old) * (sp + sp_old));
+  } else {
+    const double p = (c.exponent + 1.0) / c.exponent;
+    return weight * (power_of<I>(sp, p) - power_of<I>(sp_old, p));
+  }
+}
+
+}  // namespace platen

@@ -1,0 +1,65 @@
+// Turns the kernel templates into function pointers; included by the isa_<name>.cpp files only.
+#pragma once
+
+#include <utility>
+
+#include "kernels/contact_kernel.h"
+#include "kernels/kernel_table.h"
+#include "kernels/motion_kernel.h"
+#include "kernels/plate_kernel.h"
+
+namespace platen {
+
+template <class I, int scene, bool energy, bool exact>
+constexpr auto contact_pointer() {
+  constexpr SceneTraits traits = [] {
+    SceneTraits t = built_scenes[scene].traits;
+    t.energy = energy;
+    return t;
+  }();
+  return &contact_kernel<I, traits, exact>;
+}
+
+template <class I, bool energy, bool exact, int... scenes>
+auto contact_of_scene(int scene, std::integer_sequence<int, scenes...>) {
+  decltype(KernelTable::contacts) found = nullptr;
+  ((scene == scenes ? void(found = contact_pointer<I, scenes, energy, exact>()) : void()), ...);
+  return found;
+}
+
+template <class I, bool energy>
+auto motion_of(bool equal_spheres, bool rolling) {
+  decltype(KernelTable::motion) all[2][2] = {
+      {&motion_kernel<I, false, false, energy>, &motion_kernel<I, false, true, energy>},
+      {&motion_kernel<I, true, false, energy>, &motion_kernel<I, true, true, energy>}};
+  return all[equal_spheres][rolling];
+}
+
+template <class I>
+KernelTable kernels_of(InstructionSet set, const KernelRequest& request) {
+  constexpr auto scenes = std::make_integer_sequence<int, static_cast<int>(built_scenes.size())>();
+  KernelTable table;
+  table.instruction_set = set;
+  table.scene = request.scene >= 0 ? request.scene : cheapest_scene(request.needed);
+  table.energy = request.needed.energy;
+  table.reproducible = request.reproducible;
+  const SceneTraits& traits = built_scenes[static_cast<std::size_t>(table.scene)].traits;
+  if (request.reproducible) {
+    table.contacts = table.energy ? contact_of_scene<I, true, true>(table.scene, scenes)
+                                  : contact_of_scene<I, false, true>(table.scene, scenes);
+    table.plates = &plate_kernel<I, true>;
+  } else {
+    table.contacts = table.energy ? contact_of_scene<I, true, false>(table.scene, scenes)
+                                  : contact_of_scene<I, false, false>(table.scene, scenes);
+    table.plates = &plate_kernel<I, false>;
+  }
+  table.motion = table.energy ? motion_of<I, true>(traits.equal_spheres, request.rolling)
+                              : motion_of<I, false>(traits.equal_spheres, request.rolling);
+  return table;
+}
+
+KernelTable kernels_scalar(const KernelRequest& request);
+KernelTable kernels_avx2(const KernelRequest& request);
+KernelTable kernels_avx512(const KernelRequest& request);
+
+}  // namespace platen

@@ -1,0 +1,89 @@
+// Kick, rolling friction, drift and wrap of a batch's particles; writes their rows [docs/laws.md, "Integration"].
+//
+//   v(n+1/2) = v(n-1/2) + (F/m - g e_z) (dt_old + dt_new)/2          x(n+1) = x(n) + v(n+1/2) dt_new
+//   u(n+1/2) = u(n-1/2) + (5/2) T/m (dt_old + dt_new)/2, then slowed by rolling friction
+#pragma once
+
+#include "kernels/rolling.h"
+#include "kernels/views.h"
+
+namespace platen {
+
+template <class I, bool equal_spheres, bool rolling, bool energy>
+void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals& totals) noexcept {
+  using Real = typename I::Real;
+  const Real zero = I::set(0.0), kick = I::set(c.kick), drift = I::set(c.drift);
+  Real largest = zero;
+  Real rolled = zero;
+  bool strange = false;
+  for (std::int32_t k = 0; k < b.count; k += I::width) {
+    typename I::Record records[I::width];
+    for (int lane = 0; lane < I::width; ++lane) {
+      const std::int64_t at = record_size * static_cast<std::int64_t>(k + lane);
+      records[lane] = I::add(I::load_record(b.sum_i + at), I::load_record(b.sum_j + at));
+    }
+    Real f[8];
+    I::from_records(records, f);
+    Real inverse_m, m, R, inverse_R;
+    if constexpr (equal_spheres) {
+      inverse_m = I::set(c.inverse_mass), m = I::set(c.mass), R = I::set(c.radius), inverse_R = I::set(c.inverse_radius);
+    } else {
+      inverse_m = I::load(b.inverse_mass + k), m = I::load(b.mass + k), R = I::load(b.radius + k);
+      inverse_R = I::load(b.inverse_radius + k);
+    }
+
+    Vec3<I> v = {I::load(b.vx + k), I::load(b.vy + k), I::load(b.vz + k)};
+    const Vec3<I> acceleration = {f[0] * inverse_m, f[1] * inverse_m, f[2] * inverse_m - I::set(c.gravity)};
+    v = add_scaled<I>(v, kick, acceleration);
+
+    Vec3<I> u = {I::load(b.ux + k), I::load(b.uy + k), I::load(b.uz + k)};
+    const Real turn = (I::set(2.5) * inverse_m) * kick;
+    u = add_scaled<I>(u, turn, Vec3<I>{f[4], f[5], f[6]});
+    if constexpr (rolling) {
+      const Real strength = I::set(c.mu_r) * f[3] + f[7];
+      const Vec3<I> slowed = slowed_spin<I>(u, strength * turn);
+      if constexpr (energy) {
+        // Rotational energy (1/2)(2/5) m |u|^2 that rolling friction took.
+        const Real lost = (I::set(0.2) * m) * (dot(u, u) - dot(slowed, slowed));
+        const Real magic = I::set(c.energy.magic);
+        rolled = rolled + ((lost + magic) - magic);
+        strange = strange || I::any(I::negate(I::abs(lost) < I::set(c.energy.bound)));
+      }
+      u = slowed;
+    }
+
+    Vec3<I> x = {I::load(b.x + k), I::load(b.y + k), I::load(b.z + k)};
+    x = add_scaled<I>(x, drift, v);
+    const auto wrap = [&](Real& coordinate, double length, int axis) {
+      const Real L = I::set(length);
+      const auto below = coordinate < zero, above = coordinate >= L;
+      if (!I::any(I::either(below, above))) return;
+      double shift[I::width];
+      I::store(shift, I::where(below, I::set(-1.0), I::where(above, I::set(1.0), zero)));
+      for (int lane = 0; lane < I::width; ++lane)
+        b.image[2 * (k + lane) + axis] += static_cast<std::int32_t>(shift[lane]);
+      coordinate = I::where(below, coordinate + L, I::where(above, coordinate - L, coordinate));
+    };
+    if (c.width > 0.0) wrap(x.x, c.width, 0), wrap(x.y, c.depth, 1);
+
+    I::store(b.vx + k, v.x), I::store(b.vy + k, v.y), I::store(b.vz + k, v.z);
+    I::store(b.ux + k, u.x), I::store(b.uy + k, u.y), I::store(b.uz + k, u.z);
+    I::store(b.x + k, x.x), I::store(b.y + k, x.y), I::store(b.z + k, x.z);
+    double* row = b.rows + row_size * static_cast<std::int64_t>(k);
+    I::scatter4(row, 0, {x.x, x.y, x.z, R});
+    I::scatter4(row, 4, {v.x, v.y, v.z, m});
+    I::scatter4(row, 8, {u.x, u.y, u.z, inverse_R});
+
+    const Vec3<I> excess = {v.x - I::set(c.mean_x), v.y - I::set(c.mean_y), v.z - I::set(c.mean_z)};
+    const Real speed2 = dot(excess, excess);
+    largest = I::max(largest, speed2);
+    strange = strange || I::any(I::negate(speed2 + dot(u, u) < I::set(0x1p60)));
+  }
+  const double speed2 = I::largest(largest);
+  totals.largest_speed2 = totals.largest_speed2 > speed2 ? totals.largest_speed2 : speed2;
+  if constexpr (energy && rolling)
+    totals.rolling += static_cast<std::int64_t>(I::sum(rolled) * c.energy.inverse);
+  totals.out_of_range = totals.out_of_range || strange;
+}
+
+}  // namespace platen

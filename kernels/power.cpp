@@ -1,0 +1,9 @@
+#include "kernels/power.h"
+
+#include <cmath>
+
+namespace platen {
+
+double power(double x, double p) noexcept { return std::pow(x, p); }
+
+}  // namespace platen

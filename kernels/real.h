@@ -1,0 +1,322 @@
+// The arithmetic that kernels are written in: one Real per instruction set, the same names for all.
+//
+//   Isa::Real    a number, or a vector of `width` numbers        Isa::Mask   the result of a comparison
+//   Isa::Record  eight numbers next to each other in memory (64 bytes): one particle's or one contact's sums
+//
+// xsimd supplies load, store, + - * / and comparisons. What it lacks or does badly (xsimd 8.1: no gather instruction
+// on double, fma on AVX-512 as multiply and add, no transpose, no rsqrt on AVX-512) is written here with intrinsics;
+// tests/test_real.cpp checks every function on every instruction set. Every function is forced inline: an object
+// compiled for an instruction set must not leave a symbol that another one could be linked to.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+
+#if defined(__AVX2__)
+#include <immintrin.h>
+
+#include <xsimd/xsimd.hpp>
+#endif
+
+#define PLATEN_INLINE inline __attribute__((always_inline))
+
+namespace platen {
+
+// ---------------------------------------------------------------------------------------------- one number at a time
+struct Scalar {
+  using Real = double;
+  using Mask = bool;
+  static constexpr int width = 1;
+  static constexpr const char* name = "scalar";
+
+  struct Record {
+    double v[8];
+  };
+
+  static PLATEN_INLINE Real set(double a) { return a; }
+  static PLATEN_INLINE Real load(const double* p) { return *p; }
+  static PLATEN_INLINE void store(double* p, Real a) { *p = a; }
+  static PLATEN_INLINE Real fma(Real a, Real b, Real c) { return __builtin_fma(a, b, c); }
+  static PLATEN_INLINE Real sqrt(Real a) { return __builtin_sqrt(a); }
+  static PLATEN_INLINE Real abs(Real a) { return __builtin_fabs(a); }
+  static PLATEN_INLINE Real min(Real a, Real b) { return a < b ? a : b; }  // b when either is NaN, as minpd
+  static PLATEN_INLINE Real max(Real a, Real b) { return a > b ? a : b; }  // b when either is NaN, as maxpd
+  // Nearest integer, ties to even, for |a| < 2^51: the odd function that the minimum image needs.
+  static PLATEN_INLINE Real round(Real a) {
+    const double magic = 0x1.8p52;
+    return (a + magic) - magic;
+  }
+  static PLATEN_INLINE Real where(Mask m, Real a, Real b) { return m ? a : b; }
+  static PLATEN_INLINE bool any(Mask m) { return m; }
+  static PLATEN_INLINE int count(Mask m) { return m ? 1 : 0; }
+  static PLATEN_INLINE Mask both(Mask a, Mask b) { return a && b; }
+  static PLATEN_INLINE Mask either(Mask a, Mask b) { return a || b; }
+  static PLATEN_INLINE Mask negate(Mask a) { return !a; }
+  static PLATEN_INLINE Real fast_inverse_sqrt(Real a) { return 1.0 / __builtin_sqrt(a); }
+  static PLATEN_INLINE double sum(Real a) { return a; }  // exact for order-free terms, whose order does not matter
+  static PLATEN_INLINE double largest(Real a) { return a; }
+
+  // fields[k][lane] <- rows[index[lane]][first + k], k = 0..3: four fields of `width` rows of twelve doubles.
+  static PLATEN_INLINE void fetch4(const double* rows, const std::int32_t* index, int first, Real (&fields)[4]) {
+    const double* p = rows + 12 * static_cast<std::int64_t>(index[0]) + first;
+    for (int k = 0; k < 4; ++k) fields[k] = p[k];
+  }
+  // rows[index[0] + lane][first + k] <- fields[k][lane]
+  static PLATEN_INLINE void scatter4(double* row, int first, const Real (&fields)[4]) {
+    for (int k = 0; k < 4; ++k) row[first + k] = fields[k];
+  }
+  static PLATEN_INLINE void to_records(const Real (&fields)[8], Record (&records)[1]) {
+    for (int k = 0; k < 8; ++k) records[0].v[k] = fields[k];
+  }
+  static PLATEN_INLINE void from_records(const Record (&records)[1], Real (&fields)[8]) {
+    for (int k = 0; k < 8; ++k) fields[k] = records[0].v[k];
+  }
+  static PLATEN_INLINE Record zero_record() { return Record{{0, 0, 0, 0, 0, 0, 0, 0}}; }
+  static PLATEN_INLINE Record load_record(const double* p) {
+    Record r;
+    std::memcpy(r.v, p, sizeof r.v);
+    return r;
+  }
+  static PLATEN_INLINE void store_record(double* p, const Record& r) { std::memcpy(p, r.v, sizeof r.v); }
+  static PLATEN_INLINE Record add(const Record& a, const Record& b) {
+    Record r;
+    for (int k = 0; k < 8; ++k) r.v[k] = a.v[k] + b.v[k];
+    return r;
+  }
+  static PLATEN_INLINE Record keep(bool yes, const Record& a) { return yes ? a : zero_record(); }
+  // Reverses the sign of the first three numbers: the reaction of a force.
+  static PLATEN_INLINE Record react(const Record& a) {
+    Record r = a;
+    for (int k = 0; k < 3; ++k) r.v[k] = -a.v[k];
+    return r;
+  }
+};
+
+#if defined(__AVX2__) && defined(__FMA__)
+// ------------------------------------------------------------------------------------------------------ four at a time
+struct Avx2 {
+  using Arch = xsimd::fma3<xsimd::avx2>;
+  using Real = xsimd::batch<double, Arch>;
+  using Mask = xsimd::batch_bool<double, Arch>;
+  static constexpr int width = 4;
+  static constexpr const char* name = "avx2";
+
+  struct Record {
+    __m256d lo, hi;
+  };
+
+  static PLATEN_INLINE Real set(double a) { return _mm256_set1_pd(a); }
+  static PLATEN_INLINE Real load(const double* p) { return _mm256_loadu_pd(p); }
+  static PLATEN_INLINE void store(double* p, Real a) { _mm256_storeu_pd(p, a); }
+  static PLATEN_INLINE Real fma(Real a, Real b, Real c) { return _mm256_fmadd_pd(a, b, c); }
+  static PLATEN_INLINE Real sqrt(Real a) { return _mm256_sqrt_pd(a); }
+  static PLATEN_INLINE Real abs(Real a) { return _mm256_andnot_pd(_mm256_set1_pd(-0.0), a); }
+  static PLATEN_INLINE Real min(Real a, Real b) { return _mm256_min_pd(a, b); }
+  static PLATEN_INLINE Real max(Real a, Real b) { return _mm256_max_pd(a, b); }
+  static PLATEN_INLINE Real round(Real a) {
+    const __m256d magic = _mm256_set1_pd(0x1.8p52);
+    return _mm256_sub_pd(_mm256_add_pd(a, magic), magic);
+  }
+  static PLATEN_INLINE Real where(Mask m, Real a, Real b) { return _mm256_blendv_pd(b, a, m); }
+  static PLATEN_INLINE bool any(Mask m) { return _mm256_movemask_pd(m) != 0; }
+  static PLATEN_INLINE int count(Mask m) { return __builtin_popcount(static_cast<unsigned>(_mm256_movemask_pd(m))); }
+  static PLATEN_INLINE Mask both(Mask a, Mask b) { return _mm256_and_pd(a, b); }
+  static PLATEN_INLINE Mask either(Mask a, Mask b) { return _mm256_or_pd(a, b); }
+  static PLATEN_INLINE Mask negate(Mask a) {
+    return _mm256_xor_pd(a, _mm256_castsi256_pd(_mm256_set1_epi64x(-1)));
+  }
+  static PLATEN_INLINE Real fast_inverse_sqrt(Real a) {
+    return _mm256_div_pd(_mm256_set1_pd(1.0), _mm256_sqrt_pd(a));
+  }
+  static PLATEN_INLINE double sum(Real a) {
+    alignas(32) double v[4];
+    _mm256_store_pd(v, a);
+    return (v[0] + v[1]) + (v[2] + v[3]);
+  }
+  static PLATEN_INLINE double largest(Real a) {
+    alignas(32) double v[4];
+    _mm256_store_pd(v, a);
+    const double x = v[0] > v[1] ? v[0] : v[1], y = v[2] > v[3] ? v[2] : v[3];
+    return x > y ? x : y;
+  }
+  static PLATEN_INLINE void transpose(__m256d& a, __m256d& b, __m256d& c, __m256d& d) {
+    const __m256d ab_lo = _mm256_unpacklo_pd(a, b), ab_hi = _mm256_unpackhi_pd(a, b);
+    const __m256d cd_lo = _mm256_unpacklo_pd(c, d), cd_hi = _mm256_unpackhi_pd(c, d);
+    a = _mm256_permute2f128_pd(ab_lo, cd_lo, 0x20);
+    b = _mm256_permute2f128_pd(ab_hi, cd_hi, 0x20);
+    c = _mm256_permute2f128_pd(ab_lo, cd_lo, 0x31);
+    d = _mm256_permute2f128_pd(ab_hi, cd_hi, 0x31);
+  }
+  static PLATEN_INLINE void fetch4(const double* rows, const std::int32_t* index, int first, Real (&fields)[4]) {
+    const auto row = [&](int lane) { return _mm256_loadu_pd(rows + 12 * static_cast<std::int64_t>(index[lane]) + first); };
+    __m256d a = row(0), b = row(1), c = row(2), d = row(3);
+    transpose(a, b, c, d);
+    fields[0] = a, fields[1] = b, fields[2] = c, fields[3] = d;
+  }
+  static PLATEN_INLINE void scatter4(double* row, int first, const Real (&fields)[4]) {
+    __m256d a = fields[0], b = fields[1], c = fields[2], d = fields[3];
+    transpose(a, b, c, d);
+    _mm256_storeu_pd(row + first, a);
+    _mm256_storeu_pd(row + 12 + first, b);
+    _mm256_storeu_pd(row + 24 + first, c);
+    _mm256_storeu_pd(row + 36 + first, d);
+  }
+  static PLATEN_INLINE void to_records(const Real (&fields)[8], Record (&records)[4]) {
+    __m256d f[8];
+    for (int k = 0; k < 8; ++k) f[k] = fields[k];
+    transpose(f[0], f[1], f[2], f[3]);
+    transpose(f[4], f[5], f[6], f[7]);
+    for (int k = 0; k < 4; ++k) records[k] = {f[k], f[k + 4]};
+  }
+  static PLATEN_INLINE void from_records(const Record (&records)[4], Real (&fields)[8]) {
+    __m256d f[8];
+    for (int k = 0; k < 4; ++k) f[k] = records[k].lo, f[k + 4] = records[k].hi;
+    transpose(f[0], f[1], f[2], f[3]);
+    transpose(f[4], f[5], f[6], f[7]);
+    for (int k = 0; k < 8; ++k) fields[k] = f[k];
+  }
+  static PLATEN_INLINE Record zero_record() { return {_mm256_setzero_pd(), _mm256_setzero_pd()}; }
+  static PLATEN_INLINE Record load_record(const double* p) { return {_mm256_load_pd(p), _mm256_load_pd(p + 4)}; }
+  static PLATEN_INLINE void store_record(double* p, const Record& r) {
+    _mm256_store_pd(p, r.lo);
+    _mm256_store_pd(p + 4, r.hi);
+  }
+  static PLATEN_INLINE Record add(const Record& a, const Record& b) {
+    return {_mm256_add_pd(a.lo, b.lo), _mm256_add_pd(a.hi, b.hi)};
+  }
+  static PLATEN_INLINE Record keep(bool yes, const Record& a) {
+    const __m256d m = _mm256_castsi256_pd(_mm256_set1_epi64x(-static_cast<long long>(yes)));
+    return {_mm256_and_pd(a.lo, m), _mm256_and_pd(a.hi, m)};
+  }
+  static PLATEN_INLINE Record react(const Record& a) {
+    return {_mm256_xor_pd(a.lo, _mm256_set_pd(0.0, -0.0, -0.0, -0.0)), a.hi};
+  }
+};
+#endif
+
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+// ----------------------------------------------------------------------------------------------------- eight at a time
+struct Avx512 {
+  using Arch = xsimd::avx512dq;
+  using Real = xsimd::batch<double, Arch>;
+  using Mask = xsimd::batch_bool<double, Arch>;
+  static constexpr int width = 8;
+  static constexpr const char* name = "avx512";
+
+  struct Record {
+    __m512d v;
+  };
+
+  static PLATEN_INLINE Real set(double a) { return _mm512_set1_pd(a); }
+  static PLATEN_INLINE Real load(const double* p) { return _mm512_loadu_pd(p); }
+  static PLATEN_INLINE void store(double* p, Real a) { _mm512_storeu_pd(p, a); }
+  static PLATEN_INLINE Real fma(Real a, Real b, Real c) { return _mm512_fmadd_pd(a, b, c); }
+  static PLATEN_INLINE Real sqrt(Real a) { return _mm512_sqrt_pd(a); }
+  static PLATEN_INLINE Real abs(Real a) { return _mm512_abs_pd(a); }
+  static PLATEN_INLINE Real min(Real a, Real b) { return _mm512_min_pd(a, b); }
+  static PLATEN_INLINE Real max(Real a, Real b) { return _mm512_max_pd(a, b); }
+  static PLATEN_INLINE Real round(Real a) {
+    const __m512d magic = _mm512_set1_pd(0x1.8p52);
+    return _mm512_sub_pd(_mm512_add_pd(a, magic), magic);
+  }
+  static PLATEN_INLINE Real where(Mask m, Real a, Real b) { return _mm512_mask_blend_pd(m, b, a); }
+  static PLATEN_INLINE bool any(Mask m) { return static_cast<__mmask8>(m) != 0; }
+  static PLATEN_INLINE int count(Mask m) { return __builtin_popcount(static_cast<__mmask8>(m)); }
+  static PLATEN_INLINE Mask both(Mask a, Mask b) { return static_cast<__mmask8>(static_cast<__mmask8>(a) & static_cast<__mmask8>(b)); }
+  static PLATEN_INLINE Mask either(Mask a, Mask b) { return static_cast<__mmask8>(static_cast<__mmask8>(a) | static_cast<__mmask8>(b)); }
+  static PLATEN_INLINE Mask negate(Mask a) { return static_cast<__mmask8>(~static_cast<__mmask8>(a)); }
+  // 14 correct bits, then two Newton steps y <- y + y/2 (1 - a y^2): error below 1.5 ulp.
+  static PLATEN_INLINE Real fast_inverse_sqrt(Real a) {
+    __m512d y = _mm512_rsqrt14_pd(a);
+    const __m512d half = _mm512_set1_pd(0.5), one = _mm512_set1_pd(1.0);
+    for (int k = 0; k < 2; ++k) {
+      const __m512d e = _mm512_fnmadd_pd(_mm512_mul_pd(a, y), y, one);
+      y = _mm512_fmadd_pd(_mm512_mul_pd(half, y), e, y);
+    }
+    return y;
+  }
+  static PLATEN_INLINE double sum(Real a) { return _mm512_reduce_add_pd(a); }
+  static PLATEN_INLINE double largest(Real a) { return _mm512_reduce_max_pd(a); }
+
+  static PLATEN_INLINE void fetch4(const double* rows, const std::int32_t* index, int first, Real (&fields)[4]) {
+    const auto two = [&](int lane) {
+      const __m256d lo = _mm256_loadu_pd(rows + 12 * static_cast<std::int64_t>(index[lane]) + first);
+      const double* hi = rows + 12 * static_cast<std::int64_t>(index[lane + 4]) + first;
+      return _mm512_insertf64x4(_mm512_castpd256_pd512(lo), _mm256_loadu_pd(hi), 1);
+    };
+    const __m512d a = two(0), b = two(1), c = two(2), d = two(3);
+    const __m512d ab_lo = _mm512_unpacklo_pd(a, b), ab_hi = _mm512_unpackhi_pd(a, b);
+    const __m512d cd_lo = _mm512_unpacklo_pd(c, d), cd_hi = _mm512_unpackhi_pd(c, d);
+    const __m512i even = _mm512_set_epi64(13, 12, 5, 4, 9, 8, 1, 0), odd = _mm512_set_epi64(15, 14, 7, 6, 11, 10, 3, 2);
+    fields[0] = _mm512_permutex2var_pd(ab_lo, even, cd_lo);
+    fields[1] = _mm512_permutex2var_pd(ab_hi, even, cd_hi);
+    fields[2] = _mm512_permutex2var_pd(ab_lo, odd, cd_lo);
+    fields[3] = _mm512_permutex2var_pd(ab_hi, odd, cd_hi);
+  }
+  static PLATEN_INLINE void scatter4(double* row, int first, const Real (&fields)[4]) {
+    const __m512d a = fields[0], b = fields[1], c = fields[2], d = fields[3];
+    const __m512d ab_lo = _mm512_unpacklo_pd(a, b), ab_hi = _mm512_unpackhi_pd(a, b);
+    const __m512d cd_lo = _mm512_unpacklo_pd(c, d), cd_hi = _mm512_unpackhi_pd(c, d);
+    const __m512i low = _mm512_set_epi64(13, 12, 5, 4, 9, 8, 1, 0), high = _mm512_set_epi64(15, 14, 7, 6, 11, 10, 3, 2);
+    const __m512d r04 = _mm512_permutex2var_pd(ab_lo, low, cd_lo), r15 = _mm512_permutex2var_pd(ab_hi, low, cd_hi);
+    const __m512d r26 = _mm512_permutex2var_pd(ab_lo, high, cd_lo), r37 = _mm512_permutex2var_pd(ab_hi, high, cd_hi);
+    const auto put = [&](int lane, const __m512d& pair) {
+      _mm256_storeu_pd(row + 12 * lane + first, _mm512_castpd512_pd256(pair));
+      _mm256_storeu_pd(row + 12 * (lane + 4) + first, _mm512_extractf64x4_pd(pair, 1));
+    };
+    put(0, r04), put(1, r15), put(2, r26), put(3, r37);
+  }
+  static PLATEN_INLINE void transpose8(__m512d (&r)[8]) {
+    __m512d t[8], u[8];
+    for (int k = 0; k < 4; ++k) {
+      t[2 * k] = _mm512_unpacklo_pd(r[2 * k], r[2 * k + 1]);
+      t[2 * k + 1] = _mm512_unpackhi_pd(r[2 * k], r[2 * k + 1]);
+    }
+    const __m512i even = _mm512_set_epi64(13, 12, 5, 4, 9, 8, 1, 0), odd = _mm512_set_epi64(15, 14, 7, 6, 11, 10, 3, 2);
+    for (int h = 0; h < 2; ++h) {
+      u[4 * h + 0] = _mm512_permutex2var_pd(t[4 * h], even, t[4 * h + 2]);
+      u[4 * h + 1] = _mm512_permutex2var_pd(t[4 * h + 1], even, t[4 * h + 3]);
+      u[4 * h + 2] = _mm512_permutex2var_pd(t[4 * h], odd, t[4 * h + 2]);
+      u[4 * h + 3] = _mm512_permutex2var_pd(t[4 * h + 1], odd, t[4 * h + 3]);
+    }
+    for (int k = 0; k < 4; ++k) {
+      r[k] = _mm512_shuffle_f64x2(u[k], u[k + 4], 0x44);
+      r[k + 4] = _mm512_shuffle_f64x2(u[k], u[k + 4], 0xee);
+    }
+  }
+  static PLATEN_INLINE void to_records(const Real (&fields)[8], Record (&records)[8]) {
+    __m512d r[8];
+    for (int k = 0; k < 8; ++k) r[k] = fields[k];
+    transpose8(r);
+    for (int k = 0; k < 8; ++k) records[k].v = r[k];
+  }
+  static PLATEN_INLINE void from_records(const Record (&records)[8], Real (&fields)[8]) {
+    __m512d r[8];
+    for (int k = 0; k < 8; ++k) r[k] = records[k].v;
+    transpose8(r);
+    for (int k = 0; k < 8; ++k) fields[k] = r[k];
+  }
+  static PLATEN_INLINE Record zero_record() { return {_mm512_setzero_pd()}; }
+  static PLATEN_INLINE Record load_record(const double* p) { return {_mm512_load_pd(p)}; }
+  static PLATEN_INLINE void store_record(double* p, const Record& r) { _mm512_store_pd(p, r.v); }
+  static PLATEN_INLINE Record add(const Record& a, const Record& b) { return {_mm512_add_pd(a.v, b.v)}; }
+  static PLATEN_INLINE Record keep(bool yes, const Record& a) {
+    return {_mm512_maskz_mov_pd(static_cast<__mmask8>(-static_cast<int>(yes)), a.v)};
+  }
+  static PLATEN_INLINE Record react(const Record& a) {
+    return {_mm512_xor_pd(a.v, _mm512_set_pd(0.0, 0.0, 0.0, 0.0, 0.0, -0.0, -0.0, -0.0))};
+  }
+};
+#endif
+
+// The two ways to take 1/sqrt: full IEEE operations, or the quickest that an instruction set has.
+template <class I, bool exact>
+PLATEN_INLINE typename I::Real inverse_sqrt(typename I::Real a) {
+  if constexpr (exact)
+    return I::set(1.0) / I::sqrt(a);
+  else
+    return I::fast_inverse_sqrt(a);
+}
+
+}  // namespace platen

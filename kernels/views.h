@@ -1,0 +1,144 @@
+// What kernels see: plain pointers and numbers, owned by core.
+//
+// A particle's row, twelve doubles (96 bytes), written by the motion kernel, read by the contact kernels. The state
+// itself is kept as a structure of arrays; the row is its copy in the shape that a contact fetches with three loads:
+//
+//     x  y  z  R | vx vy vz m | ux uy uz 1/R        u = R omega [m/s]
+//
+// A record, eight doubles (64 bytes), the sums over contacts of one particle:
+//
+//     Fx Fy Fz S | Tx Ty Tz P
+//
+//     F force [N];  T = torque / R [N];  S = sum of |f_hys| a/R over pairs [N], to be multiplied by mu_r;
+//     P the same over plates, mu_r included [N]
+#pragma once
+
+#include <cstdint>
+
+namespace platen {
+
+inline constexpr int row_size = 12;    // doubles of a particle's row
+inline constexpr int record_size = 8;  // doubles of a record
+inline constexpr int chunk_size = 64;  // contacts between two conversions of energies to integers
+inline constexpr int padding = 8;      // rows of contacts are padded to a multiple of the widest vector
+
+// x rounded to a multiple of q: (x + magic) - magic with magic = 1.5 * 2^52 * q. Sums of such numbers are exact as long
+// as they stay below 2^53 q, hence the same in any order.
+struct Quantum {
+  double magic = 0.0;
+  double bound = 0.0;    // contributions must stay below this
+  double inverse = 0.0;  // 1/q
+};
+
+// Energy terms that a step adds up, in units of the energy quantum.
+enum EnergyTerm { term_plastic, term_viscous, term_sliding, term_rolling, term_model, term_count };
+
+// Constants of the pair law, [docs/laws.md, "Pairs"].
+struct LawConstants {
+  double k1, k2, k_adh, f0;
+  double exponent;           // n
+  double sp_lower;           // 1 - k1/k2:    s_p = sp_lower s while loading
+  double sp_upper;           // 1 + k_adh/k2: s_p = sp_upper s on the adhesive branch
+  double mu;
+  double mu_r;
+  double k_t;                // n = 1: tangential_ratio k1
+  double half_over_k_t;      // n = 1: 1/(2 k_t)
+  double ratio;              // tangential_ratio
+  double damping;            // 4 z (n+1)/(2n): beta_n^2 = damping m* K1
+  double beta_ratio;         // sqrt(tangential_ratio) = beta_t / beta_n
+  double beta_n;             // equal spheres, n = 1
+  double overlap_floor;      // smallest overlap put into K1 where n < 1
+  double plastic_loading;    // D = plastic_loading  * change of sp^((n+1)/n) where sp grows
+  double plastic_adhesive;   // D = plastic_adhesive * change where sp falls; <= 0
+  double radius, inverse_radius;  // equal spheres
+  double width, inverse_width, depth, inverse_depth;  // periodic lengths; all 0 where not periodic
+  double rolling_share;      // relative rolling: largest part of the relative spin that one contact may take in a step
+  Quantum force, energy;
+  double dt;                 // last drift; 0 when forces are evaluated without advancing springs
+};
+
+// The contacts that a batch owns. Sorted by i, then j; `count` is a multiple of `padding`, padded with i = j.
+//
+//   contact:      0     1     2     3     4   ...
+//   i             17    17    17    18    20  ...   owner side: particle of this batch
+//   j             18    25    903   25    21  ...   any particle
+//   slot_j        1     8     512   8     4   ...   where j's share goes: own particle, or halo slot after them
+struct PairBatch {
+  const double* rows;
+  const std::int32_t *i, *j, *slot_j;
+  double *sp, *tx, *ty, *tz;
+  double* k_t_last;     // exponent other than 1: k_t of the step before; null otherwise
+  double *sum_i, *sum_j;  // records; sum_i by i - first, sum_j by slot_j
+  std::int32_t first;   // first particle of the batch
+  std::int32_t count;
+};
+
+struct PairTotals {
+  std::int64_t contacts = 0;               // touching
+  std::int64_t energy[term_count] = {};    // quanta
+  bool out_of_range = false;               // a contribution reached its bound, or is not a number
+};
+
+// One plane: a plate or a wall, its outward normal along an axis.
+struct Plane {
+  int axis = 2;
+  double sign = 1.0;       // normal = sign * e_axis, pointing to the spheres
+  double position = 0.0;   // coordinate along the axis [m]
+  double velocity = 0.0;   // along the axis [m/s]
+};
+
+struct PlateConstants {
+  double hertz;            // 4/3 E*
+  double stiffness_n;      // 2 E*
+  double stiffness_t;      // 8 G*
+  double damping;          // 4 * 5/6 * z: c^2 = damping m S
+  double mu, mu_r;
+  double slip_ratio;       // mu (4/3 E*)/(8 G*): largest elongation = slip_ratio delta
+  Quantum force, energy;
+  double dt;
+};
+
+// Spheres of a batch that may touch one plane. `count` is a multiple of `padding`; entries from `used` on repeat a
+// particle and are ignored.
+struct PlateBatch {
+  const double* rows;
+  const std::int32_t* particle;
+  double *xi_x, *xi_y, *xi_z, *stiffness_last;  // elongation [m], S_t of the step before [N/m]
+  double* records;                              // out: one record an entry
+  double* overlap;                              // out [m], <= 0 when apart
+  std::int32_t count, used;
+};
+
+struct PlateTotals {
+  std::int64_t energy[term_count] = {};
+  std::int64_t work = 0;   // of the moving plane on the spheres, quanta
+  bool out_of_range = false;
+};
+
+struct MotionConstants {
+  double kick;             // (dt_old + dt_new)/2
+  double drift;            // dt_new
+  double gravity;          // along -z
+  double mu_r;             // of pairs
+  double inverse_mass, mass, radius, inverse_radius;  // equal spheres
+  double width, depth;     // periodic lengths; 0 where not periodic
+  double mean_x, mean_y, mean_z;  // common velocity taken out of the displacement bound
+  Quantum energy;
+};
+
+struct MotionBatch {
+  double *x, *y, *z, *vx, *vy, *vz, *ux, *uy, *uz;
+  const double *inverse_mass, *mass, *radius, *inverse_radius;  // null where spheres are equal
+  double* rows;            // of this batch's first particle
+  std::int32_t* image;     // 2 per particle
+  const double *sum_i, *sum_j;  // records; forces are their sum
+  std::int32_t count;      // multiple of padding
+};
+
+struct MotionTotals {
+  double largest_speed2 = 0.0;   // of |v - mean|^2 [m2/s2]
+  std::int64_t rolling = 0;      // rolling dissipation, quanta
+  bool out_of_range = false;     // a velocity is not finite or absurd
+};
+
+}  // namespace platen

@@ -1,0 +1,23 @@
+// Where spheres start that rain into the box: a loose random gas above the floor.
+#pragma once
+
+#include <vector>
+
+#include "protocol/stages/random_source.h"
+
+namespace platen {
+
+// Centres, N x 3 [m], of spheres of the given radii [m] that neither overlap each other (periodic images across x = 0,
+// width and y = 0, depth included when `periodic`; else every sphere is wholly inside those faces) nor come nearer to
+// z_floor [m] than 0.05 R. Spheres are inserted at random in order, layer by layer from below: a layer is closed when
+// it holds `solid_fraction` [-] of solid, or earlier where no place is found. As tall as needed. 0 <= x < width, 0 <=
+// y < depth in a periodic box.
+//
+// Throws std::invalid_argument when a sphere is wider than the box, or for a fraction outside (0, 0.34]: random
+// insertion itself comes to rest at 0.38 [Widom1966].
+std::vector<double> rain_positions(const std::vector<double>& radii, double width, double depth, bool periodic,
+                                   double z_floor, double solid_fraction, RandomSource& random);
+
+inline constexpr double rain_solid_fraction = 0.25;
+
+}  // namespace platen
