@@ -6,16 +6,18 @@
 
 namespace platen {
 
+__extension__ using Int128 = __int128;
+
 class FixedSum {
  public:
   explicit FixedSum(double unit) : unit_(unit), inverse_(1.0 / unit) {}
-  void add(double x) { sum_ += static_cast<__int128>(std::nearbyint(x * inverse_)); }
+  void add(double x) { sum_ += static_cast<Int128>(std::nearbyint(x * inverse_)); }
   void add(const FixedSum& other) { sum_ += other.sum_; }
   double value() const { return static_cast<double>(sum_) * unit_; }
 
  private:
   double unit_, inverse_;
-  __int128 sum_ = 0;
+  Int128 sum_ = 0;
 };
 
 // The smallest power of two that is not below x > 0.

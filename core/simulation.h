@@ -19,6 +19,7 @@
 #include "core/particles.h"
 #include "core/plates.h"
 #include "core/stability.h"
+#include "core/step_graph.h"
 #include "kernels/kernel_table.h"
 #include "kernels/law_parameters.h"
 
@@ -176,7 +177,7 @@ class Simulation {
   bool lists_valid_ = false, forces_valid_ = false;
 
   // Integrals since the start, in energy quanta.
-  __int128 dissipated_[term_count] = {}, rolling_ = 0, plate_work_ = 0;
+  Int128 dissipated_[term_count] = {}, rolling_ = 0, plate_work_ = 0;
   std::int64_t contacts_ = 0;  // touching sphere pairs
   double inserted_ = 0.0, removed_ = 0.0;
 

@@ -100,12 +100,12 @@ Measures Simulation::measure() {
   const FloatMode mode;
   ensure_forces();
   struct Part {
-    FixedSum kinetic, potential, plate_energy, support, top, bottom, weight;
+    FixedSum kinetic, rolled, potential, plate_energy, support, top, bottom, weight;
     double highest = -std::numeric_limits<double>::infinity(), volume = 0.0;
     PairSums pairs;
     bool touches = false;
     Part(double energy, double force)
-        : kinetic(energy), potential(energy), plate_energy(energy), support(force), top(force), bottom(force),
+        : kinetic(energy), rolled(energy), potential(energy), plate_energy(energy), support(force), top(force), bottom(force),
           weight(force), pairs(energy) {}
   };
   std::vector<Part> parts(batches_.size(), Part(energy_unit_, plate_force_unit_));
@@ -126,8 +126,12 @@ Measures Simulation::measure() {
                            p.vz[k] + h * (si[2] + sj[2]) - half * gravity_};
       const double u[3] = {p.ux[k] + 2.5 * h * (si[4] + sj[4]), p.uy[k] + 2.5 * h * (si[5] + sj[5]),
                            p.uz[k] + 2.5 * h * (si[6] + sj[6])};
-      part.kinetic.add(0.5 * m * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) +
-                       0.2 * m * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]));
+      // Rolling friction up to the full time, as in motion_kernel.h.
+      const double turning2 = u[0] * u[0] + u[1] * u[1] + u[2] * u[2], turning = std::sqrt(turning2);
+      const double loss = 2.5 * h * (motion_.mu_r * (si[3] + sj[3]) + (si[7] + sj[7]));
+      const double left = loss < turning ? (turning - loss) / turning : 0.0;
+      part.kinetic.add(0.5 * m * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) + 0.2 * m * turning2 * left * left);
+      part.rolled.add(0.2 * m * turning2 * (1.0 - left * left));
       part.potential.add(m * gravity_ * p.z[k]);
       part.weight.add(m * gravity_);
       part.highest = std::max(part.highest, p.z[k] + R);
@@ -146,7 +150,7 @@ Measures Simulation::measure() {
   });
   Part all(energy_unit_, plate_force_unit_);
   for (const Part& part : parts) {
-    all.kinetic.add(part.kinetic), all.potential.add(part.potential), all.plate_energy.add(part.plate_energy);
+    all.kinetic.add(part.kinetic), all.rolled.add(part.rolled), all.potential.add(part.potential), all.plate_energy.add(part.plate_energy);
     all.support.add(part.support), all.top.add(part.top), all.bottom.add(part.bottom), all.weight.add(part.weight);
     all.pairs.elastic.add(part.pairs.elastic), all.pairs.adhesion.add(part.pairs.adhesion);
     all.pairs.tangential.add(part.pairs.tangential);
@@ -175,12 +179,12 @@ Measures Simulation::measure() {
   r.potential_energy = potential - r.weight * z_bottom;
   Ledger& l = r.ledger;
   if (engine_.energy) {
-    const auto joule = [this](__int128 quanta) { return static_cast<double>(quanta) / law_.energy.inverse; };
+    const auto joule = [this](Int128 quanta) { return static_cast<double>(quanta) / law_.energy.inverse; };
     l.elastic_energy = all.pairs.elastic.value(), l.adhesion_energy = all.pairs.adhesion.value();
     l.tangential_energy = all.pairs.tangential.value(), l.plate_energy = all.plate_energy.value();
     l.plastic_dissipation = joule(dissipated_[term_plastic]), l.viscous_dissipation = joule(dissipated_[term_viscous]);
     l.sliding_dissipation = joule(dissipated_[term_sliding]);
-    l.rolling_dissipation = joule(dissipated_[term_rolling] + rolling_);
+    l.rolling_dissipation = joule(dissipated_[term_rolling] + rolling_) + all.rolled.value();
     l.plate_model_work = joule(dissipated_[term_model]), l.plate_work = joule(plate_work_);
     l.inserted_energy = inserted_, l.removed_energy = removed_;
     r.energy_residual = r.kinetic_energy + potential + l.elastic_energy + l.adhesion_energy + l.tangential_energy +

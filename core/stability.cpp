@@ -357,8 +357,8 @@ StepLimits free_limits(double m_min, double k2, double k_t, double c_n, double c
   // A radius of 1 is as good as any: only lever/radius counts.
   const std::vector<NetworkBody> spheres(27, {m_min, 1.0});
   StepLimits limits = step_limits(spheres, close_packing(k2, k_t, c_n, c_t));
-  // The cluster has 0.806 sqrt(m/k2) at k_t = 2/7 k1 = 2/35 k2; the worst place of random beds of 17,000 equal spheres, 0.76
-  // [own].
+  // The cluster has 0.806 sqrt(m/k2) at k_t = 2/7 k1 = 2/35 k2; the worst place of random beds of 17,000 equal
+  // spheres, 0.76 [own].
   const double margin = 0.934;
   const double usual = 0.75 * std::sqrt(m_min / k2), cluster = limits.dt_crit;
   limits.dt_crit = std::min(usual, margin * cluster);

@@ -91,7 +91,7 @@ PLATEN_INLINE TangentialResponse<I> tangential_response(const Vec3<I>& T_old, co
       I::where(product > tiny, length2 * inverse_sqrt<I, exact>(I::max(product, tiny)), I::set(1.0));
   const Vec3<I> trial = add_scaled<I>(scale<I>(stretch, flat), -(k_t * I::set(dt)), v_t);
   const Real trial2 = dot(trial, trial), limit2 = limit * limit;
-  const auto cut = trial2 > limit2;
+  const auto cut = trial2 >= limit2;  // also where both are 0: no dashpot on a frictionless contact
   const Real back = I::where(cut, limit * inverse_sqrt<I, exact>(I::max(trial2, tiny)), I::set(1.0));
   return {scale<I>(back, trial), cut, trial2, I::where(cut, limit2, trial2)};
 }

@@ -36,7 +36,7 @@ PLATEN_INLINE PlateResponse<I> plate_response(typename I::Real delta, typename I
   const Vec3<I> trial = add_scaled<I>(xi_old, I::set(c.dt), v_t);
   const Real trial2 = dot(trial, trial);
   const Real longest = I::set(c.slip_ratio) * delta, longest2 = longest * longest;
-  const auto cut = trial2 > longest2;
+  const auto cut = trial2 >= longest2;
   const Real tiny = I::set(0x1p-900);
   const Real back = I::where(cut, longest * inverse_sqrt<I, exact>(I::max(trial2, tiny)), I::set(1.0));
   const Vec3<I> xi = scale<I>(back, trial);

@@ -34,8 +34,9 @@ void check_source(const Case& c, const CaseFacts& facts, Problems& problems) {
   }
   const bool all_good = std::all_of(facts.stage_good.begin(), facts.stage_good.end(), [](bool good) { return good; });
   if (facts.has_count && !facts.has_file && !c.stages.empty() && all_good && !any_stage(c, facts, StageKind::fill)) {
-    problems.add(facts.count, "particles.count",
-                 "nothing makes the particles; allowed: a first stage of kind \"fill\", or particles.file instead of count");
+    problems.add(
+        facts.count, "particles.count",
+        "nothing makes the particles; allowed: a first stage of kind \"fill\", or particles.file instead of count");
   }
 }
 
@@ -43,8 +44,9 @@ void check_box(const Case& c, const CaseFacts& facts, Problems& problems) {
   const bool plates = c.plates.top || c.plates.bottom;
   const bool written = facts.width_good || facts.depth_good || facts.height_good;
   if (facts.plates_good && !facts.box_present && plates) {
-    problems.add(facts.box, "box", "is missing; allowed: [box] with width, depth, height, or no plates "
-                                   "(plates.top = false and plates.bottom = false)");
+    problems.add(facts.box, "box",
+                 "is missing; allowed: [box] with width, depth, height, or no plates "
+                 "(plates.top = false and plates.bottom = false)");
   }
   if (facts.plates_good && facts.box_present && facts.sides_good && c.box.sides == Sides::open && plates && !written) {
     for (const char* const key : {"width", "depth", "height"}) {
@@ -59,11 +61,14 @@ void check_box(const Case& c, const CaseFacts& facts, Problems& problems) {
   const auto check_length = [&](bool good, double length, const Position& where, const char* key) {
     if (!good || length >= narrowest) return;
     if (c.box.sides == Sides::periodic) {
-      problems.add(where, key, fmt::format("{:.6g} m is too narrow for a periodic box, a sphere would meet itself or one "
-                                           "partner twice; allowed: >= 4 R_max + 2 skin = {:.6g} m", length, narrowest));
+      problems.add(where, key,
+                   fmt::format("{:.6g} m is too narrow for a periodic box, a sphere would meet itself or one "
+                               "partner twice; allowed: >= 4 R_max + 2 skin = {:.6g} m",
+                               length, narrowest));
     } else if (c.box.sides == Sides::walls) {
-      problems.add(where, key, fmt::format("{:.6g} m is narrower than the largest sphere; allowed: >= 2 R_max = {:.6g} m",
-                                           length, narrowest));
+      problems.add(where, key,
+                   fmt::format("{:.6g} m is narrower than the largest sphere; allowed: >= 2 R_max = {:.6g} m", length,
+                               narrowest));
     }
   };
   check_length(facts.width_good, c.box.width, facts.width, "box.width");
@@ -111,8 +116,9 @@ void check_stages(const Case& c, const CaseFacts& facts, Problems& problems) {
     const Until& until = stage.until;
     if (stage.kind == StageKind::unload && until.strain && !until.stress && !until.displacement && !until.duration &&
         !strain_known) {
-      refuse("strain has no zero before a compress or crush stage, so this stage can never end; allowed: until = { stress "
-             "| displacement | duration }");
+      refuse(
+          "strain has no zero before a compress or crush stage, so this stage can never end; allowed: until = { stress "
+          "| displacement | duration }");
     }
     strain_known = strain_known || stage.kind == StageKind::compress || stage.kind == StageKind::crush;
   }

@@ -104,8 +104,10 @@ void check_nesting(const std::string& text, const std::string& name) {
       column = dots = 0;
       quote = '\0';
     } else if (quote != '\0') {
-      if (c == '\\' && quote == '"') ++i, ++column;
-      else if (c == quote) quote = '\0';
+      if (c == '\\' && quote == '"')
+        ++i, ++column;
+      else if (c == quote)
+        quote = '\0';
     } else if (c == '"' || c == '\'') {
       quote = c;
     } else if (c == '#') {
@@ -199,13 +201,20 @@ CaseEntry* CaseValue::find(std::string_view key) {
 
 const char* type_name(CaseValue::Type type) {
   switch (type) {
-    case CaseValue::Type::text: return "a string";
-    case CaseValue::Type::integer: return "a whole number";
-    case CaseValue::Type::real: return "a real number";
-    case CaseValue::Type::boolean: return "true or false";
-    case CaseValue::Type::list: return "a list";
-    case CaseValue::Type::table: return "a table";
-    case CaseValue::Type::date: return "a date or time of day";
+    case CaseValue::Type::text:
+      return "a string";
+    case CaseValue::Type::integer:
+      return "a whole number";
+    case CaseValue::Type::real:
+      return "a real number";
+    case CaseValue::Type::boolean:
+      return "true or false";
+    case CaseValue::Type::list:
+      return "a list";
+    case CaseValue::Type::table:
+      return "a table";
+    case CaseValue::Type::date:
+      return "a date or time of day";
   }
   return "";
 }
@@ -221,11 +230,16 @@ CaseValue parse_document(const std::string& text, const std::string& name) {
 
 std::string to_toml_value(const CaseValue& value) {
   switch (value.type) {
-    case CaseValue::Type::text: return to_toml_text(value.text);
-    case CaseValue::Type::integer: return std::to_string(value.integer);
-    case CaseValue::Type::real: return to_toml_real(value.real);
-    case CaseValue::Type::boolean: return value.boolean ? "true" : "false";
-    case CaseValue::Type::date: return value.text;
+    case CaseValue::Type::text:
+      return to_toml_text(value.text);
+    case CaseValue::Type::integer:
+      return std::to_string(value.integer);
+    case CaseValue::Type::real:
+      return to_toml_real(value.real);
+    case CaseValue::Type::boolean:
+      return value.boolean ? "true" : "false";
+    case CaseValue::Type::date:
+      return value.text;
     case CaseValue::Type::list: {
       std::string out = "[";
       for (const CaseValue& item : value.items) out += (out.size() > 1 ? ", " : "") + to_toml_value(item);

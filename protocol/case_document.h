@@ -25,13 +25,13 @@ struct CaseValue {
   enum class Type { text, integer, real, boolean, list, table, date };
   Type type = Type::table;
   Position where;
-  std::string text;              // text: its characters; date: as written
+  std::string text;  // text: its characters; date: as written
   std::int64_t integer = 0;
   double real = 0.0;
   bool boolean = false;
-  std::vector<CaseValue> items;     // list
-  std::vector<CaseEntry> entries;   // table, in the order of the file
-  bool guessed = false;             // text that an override gave without quotes
+  std::vector<CaseValue> items;    // list
+  std::vector<CaseEntry> entries;  // table, in the order of the file
+  bool guessed = false;            // text that an override gave without quotes
 
   const CaseEntry* find(std::string_view key) const;  // entry of a table, nullptr if absent
   CaseEntry* find(std::string_view key);

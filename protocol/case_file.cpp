@@ -17,7 +17,8 @@ std::string comment(const std::vector<std::string>& overrides) {
   std::string out;
   for (const std::string& override_text : overrides) {
     std::string line = override_text;
-    std::replace_if(line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, ' ');
+    std::replace_if(
+        line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, ' ');
     out += "# --set " + line + "\n";
   }
   return out + "\n";
@@ -27,7 +28,8 @@ std::string comment(const std::vector<std::string>& overrides) {
 
 double SizeDistribution::largest() const {
   switch (kind) {
-    case Kind::mono: return radius;
+    case Kind::mono:
+      return radius;
     case Kind::list: {
       double R = 0.0;
       for (std::size_t i = 0; i < radii.size(); ++i) {
@@ -35,13 +37,15 @@ double SizeDistribution::largest() const {
       }
       return R;
     }
-    default: return max;
+    default:
+      return max;
   }
 }
 
 double SizeDistribution::smallest() const {
   switch (kind) {
-    case Kind::mono: return radius;
+    case Kind::mono:
+      return radius;
     case Kind::list: {
       double R = largest();
       for (std::size_t i = 0; i < radii.size(); ++i) {
@@ -49,15 +53,19 @@ double SizeDistribution::smallest() const {
       }
       return R;
     }
-    default: return min;
+    default:
+      return min;
   }
 }
 
 const char* to_string(Sides sides) {
   switch (sides) {
-    case Sides::periodic: return "periodic";
-    case Sides::walls: return "walls";
-    case Sides::open: return "open";
+    case Sides::periodic:
+      return "periodic";
+    case Sides::walls:
+      return "walls";
+    case Sides::open:
+      return "open";
   }
   return "";
 }

@@ -86,8 +86,10 @@ void apply_override(CaseValue& root, const std::string& override_text, Problems&
   }
   std::vector<std::string> path(1);
   for (const char c : override_text.substr(0, equals)) {
-    if (c == '.') path.emplace_back();
-    else path.back() += c;
+    if (c == '.')
+      path.emplace_back();
+    else
+      path.back() += c;
   }
   for (std::string& part : path) {
     part = trimmed(part);
@@ -130,8 +132,8 @@ void apply_override(CaseValue& root, const std::string& override_text, Problems&
   }
   if (table->type != CaseValue::Type::table) {
     path.resize(next + 1);
-    problems.add(where, fmt::format("{}", fmt::join(path, ".")), fmt::format("is {} and has no keys; allowed: set it as a whole",
-                                                type_name(table->type)));
+    problems.add(where, fmt::format("{}", fmt::join(path, ".")),
+                 fmt::format("is {} and has no keys; allowed: set it as a whole", type_name(table->type)));
     return;
   }
   if (CaseEntry* const old = table->find(path.back())) {

@@ -22,8 +22,8 @@ std::string shown(const CaseValue& value) {
 
 std::string allowed_quantity(Quantity quantity, Range range) {
   const std::string bounds = range.text();
-  return fmt::format("allowed: {}{}{}, a plain number in {} or a string with such a unit, as \"{}\"",
-                     name_of(quantity), bounds.empty() ? "" : " ", bounds, si_unit_of(quantity), example_of(quantity));
+  return fmt::format("allowed: {}{}{}, a plain number in {} or a string with such a unit, as \"{}\"", name_of(quantity),
+                     bounds.empty() ? "" : " ", bounds, si_unit_of(quantity), example_of(quantity));
 }
 
 std::string allowed_number(Range range) {
@@ -330,9 +330,9 @@ bool TableReader::quantities(std::string_view key, Quantity quantity, Range rang
   const CaseValue* const value = look(key, need, allowed);
   if (value == nullptr) return false;
   if (value->type != CaseValue::Type::list || value->items.empty()) {
-    wrong(*value, key, value->type == CaseValue::Type::list
-                           ? "is empty"
-                           : fmt::format("is {}, wrong type", type_name(value->type)), allowed);
+    wrong(*value, key,
+          value->type == CaseValue::Type::list ? "is empty" : fmt::format("is {}, wrong type", type_name(value->type)),
+          allowed);
     return false;
   }
   std::vector<double> all;
@@ -349,9 +349,9 @@ bool TableReader::numbers(std::string_view key, Range range, Need need, std::vec
   const CaseValue* const value = look(key, need, allowed);
   if (value == nullptr) return false;
   if (value->type != CaseValue::Type::list || value->items.empty()) {
-    wrong(*value, key, value->type == CaseValue::Type::list
-                           ? "is empty"
-                           : fmt::format("is {}, wrong type", type_name(value->type)), allowed);
+    wrong(*value, key,
+          value->type == CaseValue::Type::list ? "is empty" : fmt::format("is {}, wrong type", type_name(value->type)),
+          allowed);
     return false;
   }
   std::vector<double> all;

@@ -43,8 +43,8 @@ inline constexpr double infinite = std::numeric_limits<double>::infinity();
 inline constexpr Range positive{0.0, infinite, false, false};
 inline constexpr Range not_negative{0.0, infinite, true, false};
 inline constexpr Range not_positive{-infinite, 0.0, false, true};
-inline constexpr Range fraction{0.0, 1.0, false, false};      // (0, 1)
-inline constexpr Range proper_part{0.0, 1.0, false, true};    // (0, 1]
+inline constexpr Range fraction{0.0, 1.0, false, false};    // (0, 1)
+inline constexpr Range proper_part{0.0, 1.0, false, true};  // (0, 1]
 
 enum class Need { optional, required };
 

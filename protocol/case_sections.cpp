@@ -106,12 +106,14 @@ void read_particles(TableReader& particles, ParticleSpec& out, CaseFacts& facts)
   }
   if (has_sizes && (has_radius || facts.has_file)) {
     particles.error("sizes", fmt::format("is given beside {}; allowed: exactly one of radius, sizes, file (radius may "
-                                         "stand beside file)", has_radius ? "radius" : "file"));
+                                         "stand beside file)",
+                                         has_radius ? "radius" : "file"));
   }
   if (run && particles.present() && !has_radius && !has_sizes && !facts.has_file) {
     particles.error("radius", "is missing; allowed: exactly one of radius, sizes, file");
   }
-  if (particles.text("file", Need::optional, out.file) && (out.file.empty() || out.file.find('\0') != std::string::npos)) {
+  if (particles.text("file", Need::optional, out.file) &&
+      (out.file.empty() || out.file.find('\0') != std::string::npos)) {
     particles.error("file", "is not a file name; allowed: the path of a particle file, relative to the case file");
     out.file.clear();
   }

@@ -15,16 +15,16 @@ namespace platen {
 // were read well, so that one mistake gives one message.
 struct CaseFacts {
   CaseUse use = CaseUse::run;
-  std::filesystem::path folder;      // where particle files are looked for
+  std::filesystem::path folder;  // where particle files are looked for
   Position file, particles, count, particle_file, box, width, depth, height, sides;
   bool has_count = false, has_file = false;
-  bool sizes_good = false;           // largest() has a meaning
-  bool box_present = false;          // there is a [box]
+  bool sizes_good = false;   // largest() has a meaning
+  bool box_present = false;  // there is a [box]
   bool width_good = false, depth_good = false, height_good = false, sides_good = false;
   bool plates_good = false;
   bool gravity_good = false;
-  std::vector<Position> stage;       // of the kind of each stage
-  std::vector<bool> stage_good;      // its kind is known
+  std::vector<Position> stage;          // of the kind of each stage
+  std::vector<bool> stage_good;         // its kind is known
   std::vector<std::string> stage_path;  // "stage.compress"
 };
 

@@ -10,9 +10,9 @@
 namespace platen {
 namespace {
 
-constexpr std::array all_kinds{StageKind::fill,   StageKind::vibrate, StageKind::settle,
+constexpr std::array all_kinds{StageKind::fill,     StageKind::vibrate, StageKind::settle,
                                StageKind::compress, StageKind::unload,  StageKind::hold,
-                               StageKind::release, StageKind::crush,   StageKind::run};
+                               StageKind::release,  StageKind::crush,   StageKind::run};
 
 constexpr double default_max_duration = 60.0;
 
@@ -95,7 +95,8 @@ void read_run(TableReader& stage, const std::string& who, StageSpec& out) {
   if (stage.has("duration") && until.has("duration")) {
     stage.error("duration", "is given twice; allowed: duration or until = { duration }, not both");
   } else if (!stage.has("duration") && !until.has("duration")) {
-    stage.error("duration", "is missing, the stage can never end; allowed: duration or until = { duration }, a time > 0");
+    stage.error("duration",
+                "is missing, the stage can never end; allowed: duration or until = { duration }, a time > 0");
   }
   if (out.until.duration) out.duration = out.until.duration;
   out.until.duration = out.duration;  // both places say the same
@@ -103,8 +104,12 @@ void read_run(TableReader& stage, const std::string& who, StageSpec& out) {
 
 void read_by_kind(TableReader& stage, const std::string& who, StageSpec& out) {
   switch (out.kind) {
-    case StageKind::fill: read_fill(stage, out); break;
-    case StageKind::vibrate: read_vibrate(stage, out); break;
+    case StageKind::fill:
+      read_fill(stage, out);
+      break;
+    case StageKind::vibrate:
+      read_vibrate(stage, out);
+      break;
     case StageKind::settle:
     case StageKind::release: {
       TableReader until = stage.table("until");
@@ -114,12 +119,16 @@ void read_by_kind(TableReader& stage, const std::string& who, StageSpec& out) {
     }
     case StageKind::compress:
     case StageKind::unload:
-    case StageKind::crush: read_drive(stage, who, out); break;
+    case StageKind::crush:
+      read_drive(stage, who, out);
+      break;
     case StageKind::hold:
       stage.quantity("stress", Quantity::stress, positive, Need::required, out.stress);
       stage.quantity("duration", Quantity::time, positive, Need::required, out.duration);
       break;
-    case StageKind::run: read_run(stage, who, out); break;
+    case StageKind::run:
+      read_run(stage, who, out);
+      break;
   }
 }
 
@@ -166,15 +175,24 @@ void read_stage(const CaseValue& value, const std::string& name, std::size_t num
 
 const char* to_string(StageKind kind) {
   switch (kind) {
-    case StageKind::fill: return "fill";
-    case StageKind::vibrate: return "vibrate";
-    case StageKind::settle: return "settle";
-    case StageKind::compress: return "compress";
-    case StageKind::unload: return "unload";
-    case StageKind::hold: return "hold";
-    case StageKind::release: return "release";
-    case StageKind::crush: return "crush";
-    case StageKind::run: return "run";
+    case StageKind::fill:
+      return "fill";
+    case StageKind::vibrate:
+      return "vibrate";
+    case StageKind::settle:
+      return "settle";
+    case StageKind::compress:
+      return "compress";
+    case StageKind::unload:
+      return "unload";
+    case StageKind::hold:
+      return "hold";
+    case StageKind::release:
+      return "release";
+    case StageKind::crush:
+      return "crush";
+    case StageKind::run:
+      return "run";
   }
   return "";
 }
@@ -192,8 +210,10 @@ void read_stages(const CaseEntry* entry, Case& c, CaseFacts& facts, Problems& pr
                       std::all_of(list.items.begin(), list.items.end(),
                                   [](const CaseValue& item) { return item.type == CaseValue::Type::table; });
   if (!tables) {
-    problems.add(entry->where, "stage", fmt::format("is {}, wrong type; allowed: [[stage]] with double brackets, one "
-                                                    "for each stage", type_name(list.type)));
+    problems.add(entry->where, "stage",
+                 fmt::format("is {}, wrong type; allowed: [[stage]] with double brackets, one "
+                             "for each stage",
+                             type_name(list.type)));
     facts.stage.clear();
     return;
   }

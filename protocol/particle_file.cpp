@@ -89,7 +89,8 @@ class Parser {
     if (file_.problems.size() < most_problems) {
       file_.problems.push_back(fmt::format("{}:{}: {}", name_, line, what));
     } else if (!stopped_) {
-      file_.problems.push_back(fmt::format("{}: more rows are wrong; only the first {} are named", name_, most_problems));
+      file_.problems.push_back(
+          fmt::format("{}: more rows are wrong; only the first {} are named", name_, most_problems));
       stopped_ = true;
     }
   }
@@ -98,8 +99,7 @@ class Parser {
     for (const std::string_view cell : split(text)) {
       const auto found = std::find(column_names.begin(), column_names.end(), cell);
       if (found == column_names.end()) {
-        const std::string near =
-            nearest_word(cell, std::vector<std::string>(column_names.begin(), column_names.end()));
+        const std::string near = nearest_word(cell, std::vector<std::string>(column_names.begin(), column_names.end()));
         problem(line, fmt::format("unknown column {}; allowed: {}{}", shown(cell), fmt::join(column_names, ","),
                                   near.empty() ? "" : "; nearest known column: " + near));
         continue;
@@ -112,7 +112,8 @@ class Parser {
       columns_.push_back(column);
     }
     for (const Column column : {x, y, z}) {
-      if (!has(column)) problem(line, fmt::format("column {} is missing; allowed: a header with x, y and z", column_names[column]));
+      if (!has(column))
+        problem(line, fmt::format("column {} is missing; allowed: a header with x, y and z", column_names[column]));
     }
     if (!has(radius) && !default_radius_) {
       problem(line, "column radius is missing; allowed: a column, or particles.radius in the case");
@@ -148,7 +149,8 @@ class Parser {
       }
       const std::errc error = read_number(cells[i], value[column]);
       if (error == std::errc::invalid_argument) {
-        problem(line, fmt::format("{}: {} is not a number; allowed: a plain number in SI units", column_name, shown(cells[i])));
+        problem(line, fmt::format("{}: {} is not a number; allowed: a plain number in SI units", column_name,
+                                  shown(cells[i])));
         good = false;
       } else if (error != std::errc() || !std::isfinite(value[column])) {
         problem(line, fmt::format("{}: {} is not a finite number that fits; allowed: a plain number in SI units",

@@ -27,7 +27,7 @@ ParticleFile parse_particle_file(std::string_view bytes, const std::string& name
 // What is wrong with where the particles stand: outside the box, beyond a plate that is present, or two that overlap by
 // more than the smaller radius (images counted when sides are periodic). As `name:line: ...`, the first twenty.
 // Lengths of 0 or less in box are not checked against. O(N) for N particles.
-std::vector<std::string> check_particle_positions(const ParticleFile& file, const std::string& name,
-                                                  const BoxSpec& box, bool bottom_plate, bool top_plate);
+std::vector<std::string> check_particle_positions(const ParticleFile& file, const std::string& name, const BoxSpec& box,
+                                                  bool bottom_plate, bool top_plate);
 
 }  // namespace platen

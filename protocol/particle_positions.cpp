@@ -30,7 +30,8 @@ class Findings {
     if (more) found_.resize(most_problems);
     std::stable_sort(found_.begin(), found_.end(), [](const Finding& a, const Finding& b) { return a.line < b.line; });
     for (const Finding& finding : found_) out.push_back(fmt::format("{}:{}: {}", name, finding.line, finding.what));
-    if (more) out.push_back(fmt::format("{}: more particles {}; only the first {} are named", name, kind, most_problems));
+    if (more)
+      out.push_back(fmt::format("{}: more particles {}; only the first {} are named", name, kind, most_problems));
   }
 
  private:
@@ -90,7 +91,8 @@ void find_overlaps(const ParticleFile& file, double period_x, double period_y, F
   const ParticleTable& t = file.table;
   std::vector<std::size_t> order(t.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&t](std::size_t a, std::size_t b) { return t.radius[a] < t.radius[b]; });
+  std::stable_sort(order.begin(), order.end(),
+                   [&t](std::size_t a, std::size_t b) { return t.radius[a] < t.radius[b]; });
 
   for (std::size_t begin = 0, end = 0; begin < order.size() && !findings.full(); begin = end) {
     const double cell = 2.0 * t.radius[order[begin]];
@@ -109,20 +111,21 @@ void find_overlaps(const ParticleFile& file, double period_x, double period_y, F
         const int ni = along_x.neighbours(home[0], is), nj = along_y.neighbours(home[1], js);
         const int nk = along_z.neighbours(home[2], ks);
         for (int n = 0; n < ni * nj * nk; ++n) {
-          const auto found = newest.find(cell_key(is[static_cast<std::size_t>(n % ni)],
-                                                  js[static_cast<std::size_t>(n / ni % nj)],
-                                                  ks[static_cast<std::size_t>(n / ni / nj)]));
+          const auto found =
+              newest.find(cell_key(is[static_cast<std::size_t>(n % ni)], js[static_cast<std::size_t>(n / ni % nj)],
+                                   ks[static_cast<std::size_t>(n / ni / nj)]));
           for (std::size_t other = found == newest.end() ? none : found->second; other != none; other = next[other]) {
             const std::size_t b = order[other];
             const double dx = along_x.distance(t.x[a], t.x[b]), dy = along_y.distance(t.y[a], t.y[b]);
             const double dz = t.z[a] - t.z[b];
             const double d = std::sqrt(dx * dx + dy * dy + dz * dz);
             if (!(d < t.radius[a])) continue;
-            findings.add(std::max(file.line[a], file.line[b]),
-                         fmt::format("particle {} overlaps particle {} of line {} by {:.6g} m; allowed: at most the "
-                                     "smaller radius, {:.6g} m",
-                                     t.id[file.line[a] > file.line[b] ? a : b], t.id[file.line[a] > file.line[b] ? b : a],
-                                     std::min(file.line[a], file.line[b]), t.radius[a] + t.radius[b] - d, t.radius[b]));
+            findings.add(
+                std::max(file.line[a], file.line[b]),
+                fmt::format("particle {} overlaps particle {} of line {} by {:.6g} m; allowed: at most the "
+                            "smaller radius, {:.6g} m",
+                            t.id[file.line[a] > file.line[b] ? a : b], t.id[file.line[a] > file.line[b] ? b : a],
+                            std::min(file.line[a], file.line[b]), t.radius[a] + t.radius[b] - d, t.radius[b]));
           }
         }
       }
@@ -142,8 +145,9 @@ std::vector<std::string> check_particle_positions(const ParticleFile& file, cons
   const auto check_side = [&](std::size_t i, const char* axis, double value, double length) {
     if (box.sides == Sides::open || length <= 0.0) return;
     if (box.sides == Sides::periodic && !(value >= 0.0 && value < length)) {
-      outside.add(file.line[i], fmt::format("{}: particle {} at {:.6g} m is outside the periodic box; allowed: 0 <= {} < {:.6g} m",
-                                            axis, t.id[i], value, axis, length));
+      outside.add(file.line[i],
+                  fmt::format("{}: particle {} at {:.6g} m is outside the periodic box; allowed: 0 <= {} < {:.6g} m",
+                              axis, t.id[i], value, axis, length));
     } else if (box.sides == Sides::walls && !(value > 0.0 && value < length)) {
       outside.add(file.line[i], fmt::format("{}: particle {} at {:.6g} m is beyond a wall; allowed: 0 < {} < {:.6g} m",
                                             axis, t.id[i], value, axis, length));

@@ -24,8 +24,8 @@ class UnitError : public std::runtime_error {
 // offset or a logarithm, and std::runtime_error when the unit database of UDUNITS-2 is not installed.
 double to_si(std::string_view text, Quantity quantity);
 
-const char* name_of(Quantity quantity);      // with its article, "a length"
-const char* si_unit_of(Quantity quantity);   // "m"
-const char* example_of(Quantity quantity);   // "2.5 mm"
+const char* name_of(Quantity quantity);     // with its article, "a length"
+const char* si_unit_of(Quantity quantity);  // "m"
+const char* example_of(Quantity quantity);  // "2.5 mm"
 
 }  // namespace platen

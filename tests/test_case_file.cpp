@@ -111,8 +111,10 @@ TEST(CaseFile, BadSizeDistributions) {
   refused(R"({ kind = "lognorm", min = 1, max = 2 })", "kind", "nearest known word: lognormal");
   refused(R"({ kind = "uniform", min = "2 mm", max = "1 mm" })", "min", "min < max");
   refused(R"({ kind = "uniform", min = "1 mm", max = "2 mm", sigma = 1 })", "sigma", "unknown key");
-  refused(R"({ kind = "lognormal", median = "5 mm", sigma = 0.2, min = "1 mm", max = "4 mm" })", "median", "not between");
-  refused(R"({ kind = "lognormal", median = "3 mm", sigma = "0.2 mm", min = "1 mm", max = "4 mm" })", "sigma", "no dimension");
+  refused(R"({ kind = "lognormal", median = "5 mm", sigma = 0.2, min = "1 mm", max = "4 mm" })", "median",
+          "not between");
+  refused(R"({ kind = "lognormal", median = "3 mm", sigma = "0.2 mm", min = "1 mm", max = "4 mm" })", "sigma",
+          "no dimension");
   refused(R"({ kind = "list", radii = ["1 mm", "2 mm"], weights = [1] })", "weights", "one weight for each radius");
   refused(R"({ kind = "list", radii = ["1 mm"], weights = [0] })", "weights", "at least one weight > 0");
   refused(R"({ kind = "list", radii = [] })", "radii", "is empty");
@@ -124,14 +126,16 @@ TEST(CaseFile, UnknownKeyNamesTheNearest) {
   expect_error(replaced("k2 = \"25 kN/m\"", "k2 = \"25 kN/m\"\nfrction = 0.5"),
                "case.toml:11:1: particles.law.frction: unknown key; allowed in particles.law: ",
                "; nearest known key: friction");
-  expect_error(good_case + "[enviroment]\ngravity = 9.81\n", "case.toml:21:2: enviroment: unknown key", "nearest known key: environment");
+  expect_error(good_case + "[enviroment]\ngravity = 9.81\n", "case.toml:21:2: enviroment: unknown key",
+               "nearest known key: environment");
   EXPECT_EQ(errors_of(replaced("seed = 7", "zzzzzzzzzzzz = 7")).find("nearest"), std::string::npos)
       << "nothing is proposed where nothing is near";
 }
 
 TEST(CaseFile, WrongDimension) {
   expect_error(replaced("\"2.5 mm\"", "\"2.5 kg\""),
-               "case.toml:5:10: particles.radius: \"2.5 kg\" has the wrong dimension, it is not a length; allowed: a length > 0");
+               "case.toml:5:10: particles.radius: \"2.5 kg\" has the wrong dimension, it is not a length; allowed: a "
+               "length > 0");
   expect_error(replaced("seed = 7", "seed = 7\n[environment]\ngravity = \"10 mm/s\""),
                "case.toml:5:11: environment.gravity: \"10 mm/s\" has the wrong dimension, it is not an acceleration");
 }
@@ -143,13 +147,17 @@ TEST(CaseFile, DimensionlessKeysTakeNoUnit) {
 }
 
 TEST(CaseFile, WrongTypes) {
-  expect_error(replaced("count = 100", "count = 10.5"), "case.toml:7:9: particles.count: is a real number, wrong type", "a whole number");
+  expect_error(replaced("count = 100", "count = 10.5"), "case.toml:7:9: particles.count: is a real number, wrong type",
+               "a whole number");
   expect_error(replaced("seed = 7", "seed = \"x\""), "case.toml:3:8: case.seed: is a string, wrong type");
-  expect_error(replaced("\"small\"", "5"), "case.toml:2:9: case.title: is a whole number, wrong type; allowed: a string");
+  expect_error(replaced("\"small\"", "5"),
+               "case.toml:2:9: case.title: is a whole number, wrong type; allowed: a string");
   expect_error(replaced("\"2.5 mm\"", "true"), "case.toml:5:10: particles.radius: is true or false, wrong type");
-  expect_error(replaced("\"2.5 mm\"", "2024-01-01"), "case.toml:5:10: particles.radius: is a date or time of day, wrong type");
+  expect_error(replaced("\"2.5 mm\"", "2024-01-01"),
+               "case.toml:5:10: particles.radius: is a date or time of day, wrong type");
   expect_error("plates = 3\n" + good_case, "case.toml:1:10: plates: is a whole number, wrong type; allowed: a table");
-  expect_error(good_case + "[plates]\ntop = 1\n", "case.toml:22:7: plates.top: is a whole number, wrong type; allowed: true or false");
+  expect_error(good_case + "[plates]\ntop = 1\n",
+               "case.toml:22:7: plates.top: is a whole number, wrong type; allowed: true or false");
 }
 
 TEST(CaseFile, NotFinite) {
@@ -161,34 +169,46 @@ TEST(CaseFile, NotFinite) {
 TEST(CaseFile, ImpossibleValues) {
   const auto law = [](const std::string& line) { return replaced("k2 = \"25 kN/m\"", "k2 = \"25 kN/m\"\n" + line); };
   const std::string at = "case.toml:11:";
-  expect_error(replaced("\"2.5 mm\"", "0"), "case.toml:5:10: particles.radius: 0 is out of range; allowed: a length > 0");
-  expect_error(replaced("\"2000 kg/m3\"", "-5"), "case.toml:6:11: particles.density: -5 is out of range; allowed: a density > 0");
+  expect_error(replaced("\"2.5 mm\"", "0"),
+               "case.toml:5:10: particles.radius: 0 is out of range; allowed: a length > 0");
+  expect_error(replaced("\"2000 kg/m3\"", "-5"),
+               "case.toml:6:11: particles.density: -5 is out of range; allowed: a density > 0");
   expect_error(replaced("count = 100", "count = 0"), "case.toml:7:9: particles.count: 0 is out of range");
-  expect_error(replaced("25 kN/m", "1 kN/m"), "case.toml:10:6: particles.law.k2: 1000 is smaller than k1 = 5000; allowed: k2 >= k1");
+  expect_error(replaced("25 kN/m", "1 kN/m"),
+               "case.toml:10:6: particles.law.k2: 1000 is smaller than k1 = 5000; allowed: k2 >= k1");
   expect_error(law("f0 = \"0.4 N\""), at + "6: particles.law.f0: \"0.4 N\" is out of range; allowed: a force <= 0");
-  expect_error(law("restitution = 0"), at + "15: particles.law.restitution: 0 is out of range; allowed: a plain number in (0, 1]");
+  expect_error(law("restitution = 0"),
+               at + "15: particles.law.restitution: 0 is out of range; allowed: a plain number in (0, 1]");
   expect_error(law("restitution = 1.01"), at + "15: particles.law.restitution: 1.01 is out of range");
   expect_error(law("k_adh = -1"), at + "9: particles.law.k_adh: -1 is out of range; allowed: a stiffness >= 0");
   expect_error(law("exponent = 0"), at + "12: particles.law.exponent: 0 is out of range");
-  expect_error(good_case + "[plates]\npoisson_ratio = 0.6\n", "case.toml:22:17: plates.poisson_ratio: 0.6 is out of range; allowed: a plain number in (-1, 0.5]");
-  expect_error(good_case + "[plates]\nparticle_poisson_ratio = -1\n", "case.toml:22:26: plates.particle_poisson_ratio: -1 is out of range");
-  expect_error(good_case + "[engine]\ncheck_every = 0\n", "case.toml:22:15: engine.check_every: 0 is out of range; allowed: a whole number from 1");
-  expect_error(good_case + "[environment]\ngravity = -9.81\n", "case.toml:22:11: environment.gravity: -9.81 is out of range; allowed: an acceleration >= 0");
+  expect_error(good_case + "[plates]\npoisson_ratio = 0.6\n",
+               "case.toml:22:17: plates.poisson_ratio: 0.6 is out of range; allowed: a plain number in (-1, 0.5]");
+  expect_error(good_case + "[plates]\nparticle_poisson_ratio = -1\n",
+               "case.toml:22:26: plates.particle_poisson_ratio: -1 is out of range");
+  expect_error(good_case + "[engine]\ncheck_every = 0\n",
+               "case.toml:22:15: engine.check_every: 0 is out of range; allowed: a whole number from 1");
+  expect_error(good_case + "[environment]\ngravity = -9.81\n",
+               "case.toml:22:11: environment.gravity: -9.81 is out of range; allowed: an acceleration >= 0");
 }
 
 TEST(CaseFile, UnknownWords) {
   expect_error(replaced("height = \"80 mm\"", "height = \"80 mm\"\nsides = \"periodc\""),
                "case.toml:15:9: box.sides: \"periodc\" is unknown; allowed: \"periodic\", \"walls\", \"open\"",
                "nearest known word: periodic");
-  expect_error(good_case + "[time]\nstep = \"automatic\"\n", "case.toml:22:8: time.step: \"automatic\" is unknown; allowed: \"auto\" or a time > 0");
-  expect_error(good_case + "[engine]\nbatch = \"all\"\n", "case.toml:22:9: engine.batch: \"all\" is unknown; allowed: \"auto\" or a whole number");
+  expect_error(good_case + "[time]\nstep = \"automatic\"\n",
+               "case.toml:22:8: time.step: \"automatic\" is unknown; allowed: \"auto\" or a time > 0");
+  expect_error(good_case + "[engine]\nbatch = \"all\"\n",
+               "case.toml:22:9: engine.batch: \"all\" is unknown; allowed: \"auto\" or a whole number");
   expect_error(good_case + "[particles.law.x]\n", "case.toml:21:16: particles.law.x: unknown key");
 }
 
 TEST(CaseFile, MissingKeysPointAtTheTable) {
-  expect_error(replaced("density = \"2000 kg/m3\"\n", ""), "case.toml:4:1: particles.density: is missing; allowed: a density > 0");
+  expect_error(replaced("density = \"2000 kg/m3\"\n", ""),
+               "case.toml:4:1: particles.density: is missing; allowed: a density > 0");
   expect_error(replaced("k1 = \"5 kN/m\"\n", ""), "case.toml:8:1: particles.law.k1: is missing");
-  expect_error(replaced("radius = \"2.5 mm\"\n", ""), "case.toml:4:1: particles.radius: is missing; allowed: exactly one of radius, sizes, file");
+  expect_error(replaced("radius = \"2.5 mm\"\n", ""),
+               "case.toml:4:1: particles.radius: is missing; allowed: exactly one of radius, sizes, file");
   expect_error(replaced("height = \"80 mm\"\n", ""), "case.toml:11:1: box.height: is missing");
   EXPECT_NE(errors_of("").find("case.toml:1:1: particles: is missing"), std::string::npos);
   EXPECT_NE(errors_of("").find("stage: there are no stages"), std::string::npos);
@@ -196,17 +216,22 @@ TEST(CaseFile, MissingKeysPointAtTheTable) {
 
 TEST(CaseFile, ExponentsOtherThanOneTakePlainStiffnesses) {
   const std::string text = replaced("k1 = \"5 kN/m\"", "exponent = 1.5\nk1 = 5e4");
-  expect_error(text, "case.toml:11:6: particles.law.k2: \"25 kN/m\" is a string, but with an exponent other than 1 stiffnesses are in N/m^n");
+  expect_error(text,
+               "case.toml:11:6: particles.law.k2: \"25 kN/m\" is a string, but with an exponent other than 1 "
+               "stiffnesses are in N/m^n");
   EXPECT_EQ(errors_of(replaced("\"25 kN/m\"", "25e4", text)), "accepted");
 }
 
 TEST(CaseFile, PeriodicBoxTooNarrow) {
   // R = 2.5 mm, automatic skin 0.3 R: 4 R + 2 skin = 11.5 mm.
-  expect_error(replaced("width = \"30 mm\"", "width = \"11.4 mm\""), "case.toml:12:9: box.width: 0.0114 m is too narrow", ">= 4 R_max + 2 skin = 0.0115 m");
+  expect_error(replaced("width = \"30 mm\"", "width = \"11.4 mm\""),
+               "case.toml:12:9: box.width: 0.0114 m is too narrow", ">= 4 R_max + 2 skin = 0.0115 m");
   EXPECT_EQ(errors_of(replaced("width = \"30 mm\"", "width = \"11.6 mm\"")), "accepted");
-  expect_error(replaced("depth = \"30 mm\"", "depth = \"11.6 mm\"") + "[engine]\nskin = \"1 mm\"\n", "case.toml:13:9: box.depth: 0.0116 m is too narrow", "0.012 m");
+  expect_error(replaced("depth = \"30 mm\"", "depth = \"11.6 mm\"") + "[engine]\nskin = \"1 mm\"\n",
+               "case.toml:13:9: box.depth: 0.0116 m is too narrow", "0.012 m");
   EXPECT_EQ(errors_of(replaced("depth = \"30 mm\"", "depth = \"6 mm\"\nsides = \"walls\"")), "accepted");
-  expect_error(replaced("depth = \"30 mm\"", "depth = \"4 mm\"\nsides = \"walls\""), "case.toml:13:9: box.depth: 0.004 m is narrower than the largest sphere");
+  expect_error(replaced("depth = \"30 mm\"", "depth = \"4 mm\"\nsides = \"walls\""),
+               "case.toml:13:9: box.depth: 0.004 m is narrower than the largest sphere");
 }
 
 TEST(CaseFile, AllErrorsAtOnceInTheOrderOfTheFile) {
@@ -222,7 +247,8 @@ TEST(CaseFile, AllErrorsAtOnceInTheOrderOfTheFile) {
 
 TEST(CaseFile, SyntaxErrorAloneWithCaret) {
   EXPECT_EQ(errors_of("[case]\nsed = 1\nseed = = 3\n"),
-            "case.toml:3:8: TOML syntax: Error while parsing value: could not determine value type\n  seed = = 3\n         ^");
+            "case.toml:3:8: TOML syntax: Error while parsing value: could not determine value type\n  seed = = 3\n     "
+            "    ^");
   EXPECT_NE(errors_of("[case]\nseed = 1\nseed = 2\n").find("case.toml:3:"), std::string::npos) << "a key given twice";
 }
 
@@ -240,7 +266,9 @@ TEST(CaseFile, Overrides) {
 }
 
 TEST(CaseFile, OverriddenTextReadsBackTheSame) {
-  const Case c = parse_case(good_case, "case.toml", ".", {"case.title=\"a \\\"b\\\" \\u0007 ü\"", "particles.density=0.1", "particles.radius=2.5e-3"});
+  const Case c =
+      parse_case(good_case, "case.toml", ".",
+                 {"case.title=\"a \\\"b\\\" \\u0007 ü\"", "particles.density=0.1", "particles.radius=2.5e-3"});
   const Case again = parse_case(c.text, "case.toml", ".");
   EXPECT_EQ(again.title, "a \"b\" \a ü");
   EXPECT_EQ(again.particles.density, 0.1);
@@ -254,12 +282,14 @@ TEST(CaseFile, BadOverrides) {
   const auto refused = [](const std::string& o, const std::string& message, const std::string& part = "") {
     expect_error(good_case, "--set " + o + ": " + message, part, {o});
   };
-  refused("stage.compres.speed=1", "stage.compres: there is no such stage; allowed: 1 fill, 2 compress", "nearest known stage: compress");
+  refused("stage.compres.speed=1", "stage.compres: there is no such stage; allowed: 1 fill, 2 compress",
+          "nearest known stage: compress");
   refused("stage.3.speed=1", "stage.3: there is no such stage");
   refused("stage.2=1", "stage.2: is a whole stage");
   refused("engine.bach=1", "engine.bach: unknown key; allowed in engine: ", "nearest known key: batch");
   refused("particls.count=3", "particls: unknown key", "nearest known key: particles");
-  refused("stage.compress.speed=fast", "stage.compress.speed: \"fast\" does not begin with a number", "TOML strings need quotes");
+  refused("stage.compress.speed=fast", "stage.compress.speed: \"fast\" does not begin with a number",
+          "TOML strings need quotes");
   refused("stage.compress.speed=-1", "stage.compress.speed: -1 is out of range");
   refused("particles.radius.x=1", "particles.radius: is a string and has no keys");
   refused("particles.radius", "there is no value");
@@ -272,7 +302,9 @@ TEST(CaseFile, LawOnlyNeedsOnlyTheLaw) {
   const std::string law = "[particles.law]\nk1 = 1\nk2 = 2\n";
   EXPECT_EQ(parse_case(law, "law.toml", ".", {}, CaseUse::law_only).particles.law.k2, 2.0);
   EXPECT_EQ(errors_of(good_case, {}, ".", CaseUse::law_only), "accepted");
-  EXPECT_NE(errors_of(law + "[plates]\nfriction = -1\n", {}, ".", CaseUse::law_only).find("plates.friction: -1 is out of range"), std::string::npos);
+  EXPECT_NE(errors_of(law + "[plates]\nfriction = -1\n", {}, ".", CaseUse::law_only)
+                .find("plates.friction: -1 is out of range"),
+            std::string::npos);
   EXPECT_NE(errors_of("", {}, ".", CaseUse::law_only).find("particles: is missing"), std::string::npos);
 }
 
@@ -289,10 +321,18 @@ TEST(CaseFile, AnyBytesAreSafe) {
     for (std::size_t n = 1 + random() % 8; n > 0; --n) {
       const std::size_t at = random() % text.size();
       switch (random() % 4) {
-        case 0: text[at] = static_cast<char>(random() % 256); break;
-        case 1: text.erase(at, 1 + random() % 20); break;
-        case 2: text.insert(at, 1, "=.[]{}\"'#\n,x1-"[random() % 14]); break;
-        default: text.insert(at, text.substr(random() % text.size(), random() % 60)); break;
+        case 0:
+          text[at] = static_cast<char>(random() % 256);
+          break;
+        case 1:
+          text.erase(at, 1 + random() % 20);
+          break;
+        case 2:
+          text.insert(at, 1, "=.[]{}\"'#\n,x1-"[random() % 14]);
+          break;
+        default:
+          text.insert(at, text.substr(random() % text.size(), random() % 60));
+          break;
       }
     }
     EXPECT_FALSE(errors_of(text).empty());

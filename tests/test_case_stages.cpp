@@ -51,7 +51,8 @@ kind = "compress"
 speed = 1
 until = { displacement = "1 mm" }
 strain_zero = "1 kPa"
-)", "case.toml", ".");
+)",
+                            "case.toml", ".");
   const auto& s = c.stages;
   ASSERT_EQ(s.size(), 10u);
   EXPECT_EQ(s[0].method, FillMethod::grow);
@@ -77,91 +78,123 @@ strain_zero = "1 kPa"
 }
 
 TEST(CaseStages, KindAndName) {
-  refused("[[stage]]\nkind = \"setle\"\n", "22:8: stage.setle.kind: \"setle\" is unknown; allowed: \"fill\", \"vibrate\"", "nearest known word: settle");
+  refused("[[stage]]\nkind = \"setle\"\n",
+          "22:8: stage.setle.kind: \"setle\" is unknown; allowed: \"fill\", \"vibrate\"", "nearest known word: settle");
   refused("[[stage]]\nname = \"x\"\n", "21:1: stage.x.kind: is missing");
-  refused("[[stage]]\nkind = \"settle\"\nname = \"compress\"\n", "23:8: stage.compress.name: stage 3 has the name \"compress\" of stage 2");
+  refused("[[stage]]\nkind = \"settle\"\nname = \"compress\"\n",
+          "23:8: stage.compress.name: stage 3 has the name \"compress\" of stage 2");
   refused("[[stage]]\nkind = \"settle\"\nname = \"a/b\"\n", "23:8: stage.3.name: is not a good name");
-  EXPECT_EQ(with("[[stage]]\nkind = \"settle\"\n[[stage]]\nkind = \"settle\"\nname = \"my rest\"\n").stages[3].name, "my rest");
+  EXPECT_EQ(with("[[stage]]\nkind = \"settle\"\n[[stage]]\nkind = \"settle\"\nname = \"my rest\"\n").stages[3].name,
+            "my rest");
 }
 
 TEST(CaseStages, NoStages) {
   const std::string without = good_case.substr(0, good_case.find("[[stage]]"));
   expect_error(without, "case.toml:1:1: stage: there are no stages; allowed: at least one [[stage]]");
-  expect_error(without + "[stage]\nkind = \"fill\"\n", "case.toml:15:2: stage: is a table, wrong type; allowed: [[stage]] with double brackets");
+  expect_error(without + "[stage]\nkind = \"fill\"\n",
+               "case.toml:15:2: stage: is a table, wrong type; allowed: [[stage]] with double brackets");
   expect_error("stage = []\n" + without, "case.toml:1:9: stage: there are no stages");
 }
 
 TEST(CaseStages, KeysOfAnotherKind) {
-  refused("[[stage]]\nkind = \"settle\"\nspeed = 1\n", "23:1: stage.settle.speed: unknown key; allowed in a settle stage: kind, name, max_duration, frames, until");
-  refused("[[stage]]\nkind = \"settle\"\nuntil = { stress = 1 }\n", "23:11: stage.settle.until.stress: unknown key; allowed in until of a settle stage: kinetic_to_potential");
+  refused("[[stage]]\nkind = \"settle\"\nspeed = 1\n",
+          "23:1: stage.settle.speed: unknown key; allowed in a settle stage: kind, name, max_duration, frames, until");
+  refused("[[stage]]\nkind = \"settle\"\nuntil = { stress = 1 }\n",
+          "23:11: stage.settle.until.stress: unknown key; allowed in until of a settle stage: kinetic_to_potential");
   refused("[[stage]]\nkind = \"unload\"\nspeed = 1\nstrain_zero = 5\n", "24:1: stage.unload.strain_zero: unknown key");
-  refused("[[stage]]\nkind = \"unload\"\nspeed = 1\nuntil = { porosity = 0.5 }\n", "24:11: stage.unload.until.porosity: unknown key");
-  expect_error(replaced("{ stress = \"40 kPa\" }", "{ drop = 0.2, strain = 0.1 }"), "case.toml:20:11: stage.compress.until.drop: unknown key");
-  expect_error(replaced("kind = \"fill\"", "kind = \"fill\"\nporosity = 0.4"), "case.toml:17:1: stage.fill.porosity: unknown key");
+  refused("[[stage]]\nkind = \"unload\"\nspeed = 1\nuntil = { porosity = 0.5 }\n",
+          "24:11: stage.unload.until.porosity: unknown key");
+  expect_error(replaced("{ stress = \"40 kPa\" }", "{ drop = 0.2, strain = 0.1 }"),
+               "case.toml:20:11: stage.compress.until.drop: unknown key");
+  expect_error(replaced("kind = \"fill\"", "kind = \"fill\"\nporosity = 0.4"),
+               "case.toml:17:1: stage.fill.porosity: unknown key");
 }
 
 TEST(CaseStages, StagesThatCanNeverEnd) {
-  expect_error(replaced("until = { stress = \"40 kPa\" }\n", ""), "case.toml:17:1: stage.compress.until: is missing or empty, the stage can never end");
+  expect_error(replaced("until = { stress = \"40 kPa\" }\n", ""),
+               "case.toml:17:1: stage.compress.until: is missing or empty, the stage can never end");
   expect_error(replaced("{ stress = \"40 kPa\" }", "{ }"), "case.toml:20:9: stage.compress.until: is missing or empty");
   refused("[[stage]]\nkind = \"crush\"\nspeed = 1\n", "21:1: stage.crush.until: is missing or empty");
   refused("[[stage]]\nkind = \"run\"\n", "21:1: stage.run.duration: is missing, the stage can never end");
   refused("[[stage]]\nkind = \"hold\"\nstress = 1\n", "21:1: stage.hold.duration: is missing");
-  expect_error(replaced("kind = \"compress\"", "kind = \"unload\"", replaced("{ stress = \"40 kPa\" }", "{ strain = 0.1 }")),
-               "case.toml:18:8: stage.unload: strain has no zero before a compress or crush stage");
+  expect_error(
+      replaced("kind = \"compress\"", "kind = \"unload\"", replaced("{ stress = \"40 kPa\" }", "{ strain = 0.1 }")),
+      "case.toml:18:8: stage.unload: strain has no zero before a compress or crush stage");
 }
 
 TEST(CaseStages, ImpossibleValues) {
-  refused("[[stage]]\nkind = \"vibrate\"\nfrequency = 1\namplitude = 0.001\nduration = 0.5\n", "25:12: stage.vibrate.duration: holds 0.5 of a period; allowed: frequency * duration >= 1");
-  refused("[[stage]]\nkind = \"vibrate\"\nfrequency = \"2 s\"\namplitude = 0.001\nduration = 5\n", "23:13: stage.vibrate.frequency: \"2 s\" has the wrong dimension, it is not a frequency");
-  expect_error(replaced("\"10 mm/s\"", "0"), "case.toml:19:9: stage.compress.speed: 0 is out of range; allowed: a speed > 0");
-  expect_error(replaced("\"40 kPa\"", "0"), "case.toml:20:20: stage.compress.until.stress: 0 is out of range; allowed: a stress > 0");
-  refused("[[stage]]\nkind = \"crush\"\nspeed = 1\nuntil = { strain = 0.2, drop = 1 }\n", "24:32: stage.crush.until.drop: 1 is out of range; allowed: a plain number in (0, 1)");
+  refused("[[stage]]\nkind = \"vibrate\"\nfrequency = 1\namplitude = 0.001\nduration = 0.5\n",
+          "25:12: stage.vibrate.duration: holds 0.5 of a period; allowed: frequency * duration >= 1");
+  refused("[[stage]]\nkind = \"vibrate\"\nfrequency = \"2 s\"\namplitude = 0.001\nduration = 5\n",
+          "23:13: stage.vibrate.frequency: \"2 s\" has the wrong dimension, it is not a frequency");
+  expect_error(replaced("\"10 mm/s\"", "0"),
+               "case.toml:19:9: stage.compress.speed: 0 is out of range; allowed: a speed > 0");
+  expect_error(replaced("\"40 kPa\"", "0"),
+               "case.toml:20:20: stage.compress.until.stress: 0 is out of range; allowed: a stress > 0");
+  refused("[[stage]]\nkind = \"crush\"\nspeed = 1\nuntil = { strain = 0.2, drop = 1 }\n",
+          "24:32: stage.crush.until.drop: 1 is out of range; allowed: a plain number in (0, 1)");
   refused("[[stage]]\nkind = \"run\"\nduration = -1\n", "23:12: stage.run.duration: -1 is out of range");
-  refused("[[stage]]\nkind = \"run\"\nduration = 1\nuntil = { duration = 2 }\n", "23:12: stage.run.duration: is given twice");
+  refused("[[stage]]\nkind = \"run\"\nduration = 1\nuntil = { duration = 2 }\n",
+          "23:12: stage.run.duration: is given twice");
   refused("[[stage]]\nkind = \"settle\"\nmax_duration = 0\n", "23:16: stage.settle.max_duration: 0 is out of range");
-  expect_error(replaced("kind = \"fill\"", "kind = \"fill\"\nmethod = \"grow\""), "case.toml:15:1: stage.fill.porosity: is missing");
-  expect_error(replaced("kind = \"fill\"", "kind = \"fill\"\nmethod = \"snow\""), "case.toml:17:10: stage.fill.method: \"snow\" is unknown; allowed: \"rain\", \"grow\"");
+  expect_error(replaced("kind = \"fill\"", "kind = \"fill\"\nmethod = \"grow\""),
+               "case.toml:15:1: stage.fill.porosity: is missing");
+  expect_error(replaced("kind = \"fill\"", "kind = \"fill\"\nmethod = \"snow\""),
+               "case.toml:17:10: stage.fill.method: \"snow\" is unknown; allowed: \"rain\", \"grow\"");
 }
 
 TEST(CaseStages, WhereParticlesComeFrom) {
-  expect_error(replaced("[[stage]]\nkind = \"fill\"\n", ""), "case.toml:7:9: particles.count: nothing makes the particles");
+  expect_error(replaced("[[stage]]\nkind = \"fill\"\n", ""),
+               "case.toml:7:9: particles.count: nothing makes the particles");
   refused("[[stage]]\nkind = \"fill\"\n", "22:8: stage.fill-2: fill is not the first stage");
 }
 
 TEST(CaseStages, PlatesThatStagesNeed) {
   refused("[plates]\ntop = false\n", "18:8: stage.compress: compress moves the top plate, but there is none");
   for (const char* kind : {"unload", "crush"}) {
-    const std::string text = replaced("kind = \"compress\"", "kind = \"" + std::string(kind) + "\"") + "[plates]\ntop = false\n";
+    const std::string text =
+        replaced("kind = \"compress\"", "kind = \"" + std::string(kind) + "\"") + "[plates]\ntop = false\n";
     expect_error(text, "case.toml:18:8: stage." + std::string(kind) + ": " + kind + " moves the top plate");
   }
   const std::string no_compress = good_case.substr(0, good_case.rfind("[[stage]]"));
-  expect_error(no_compress + "[[stage]]\nkind = \"hold\"\nstress = 1\nduration = 1\n[plates]\ntop = false\n", "case.toml:18:8: stage.hold: hold moves the top plate");
-  expect_error(no_compress + "[plates]\nbottom = false\n", "case.toml:16:8: stage.fill: fill by rain needs the bottom plate");
-  expect_error(replaced("kind = \"fill\"", "kind = \"fill\"\nmethod = \"grow\"\nporosity = 0.5") +
-                   "[[stage]]\nkind = \"vibrate\"\nfrequency = 60\namplitude = 0.001\nduration = 1\n[plates]\nbottom = false\n",
-               "case.toml:24:8: stage.vibrate: vibrate moves the bottom plate, but there is none");
+  expect_error(no_compress + "[[stage]]\nkind = \"hold\"\nstress = 1\nduration = 1\n[plates]\ntop = false\n",
+               "case.toml:18:8: stage.hold: hold moves the top plate");
+  expect_error(no_compress + "[plates]\nbottom = false\n",
+               "case.toml:16:8: stage.fill: fill by rain needs the bottom plate");
+  expect_error(
+      replaced("kind = \"fill\"", "kind = \"fill\"\nmethod = \"grow\"\nporosity = 0.5") +
+          "[[stage]]\nkind = \"vibrate\"\nfrequency = 60\namplitude = 0.001\nduration = 1\n[plates]\nbottom = false\n",
+      "case.toml:24:8: stage.vibrate: vibrate moves the bottom plate, but there is none");
 }
 
 TEST(CaseStages, RainNeedsGravity) {
-  refused("[environment]\ngravity = 0\n", "16:8: stage.fill: fill by rain needs gravity; allowed: environment.gravity > 0");
+  refused("[environment]\ngravity = 0\n",
+          "16:8: stage.fill: fill by rain needs gravity; allowed: environment.gravity > 0");
 }
 
 TEST(CaseStages, BoxThatIsNeeded) {
   const std::string box = "[box]\nwidth = \"30 mm\"\ndepth = \"30 mm\"\nheight = \"80 mm\"\n";
-  expect_error(replaced(box, ""), "case.toml:1:1: box: is missing; allowed: [box] with width, depth, height, or no plates");
+  expect_error(replaced(box, ""),
+               "case.toml:1:1: box: is missing; allowed: [box] with width, depth, height, or no plates");
   const std::string open = errors_of(replaced(box, "[box]\nsides = \"open\"\n"));
   EXPECT_NE(open.find("case.toml:11:1: box.width: is missing"), std::string::npos) << open;
 }
 
 TEST(CaseStages, ReleaseOfOpenSides) {
-  refused("[[stage]]\nkind = \"release\"\n[[stage]]\nkind = \"release\"\n", "24:8: stage.release-2: the sides are open already");
-  expect_error(replaced("height = \"80 mm\"", "height = \"80 mm\"\nsides = \"open\"") + "[[stage]]\nkind = \"release\"\n", "case.toml:23:8: stage.release: the sides are open already");
+  refused("[[stage]]\nkind = \"release\"\n[[stage]]\nkind = \"release\"\n",
+          "24:8: stage.release-2: the sides are open already");
+  expect_error(
+      replaced("height = \"80 mm\"", "height = \"80 mm\"\nsides = \"open\"") + "[[stage]]\nkind = \"release\"\n",
+      "case.toml:23:8: stage.release: the sides are open already");
   EXPECT_EQ(with("[[stage]]\nkind = \"release\"\n").stages.size(), 3u);
-  EXPECT_EQ(errors_of(replaced("height = \"80 mm\"", "height = \"80 mm\"\nsides = \"walls\"") + "[[stage]]\nkind = \"release\"\n"), "accepted");
+  EXPECT_EQ(errors_of(replaced("height = \"80 mm\"", "height = \"80 mm\"\nsides = \"walls\"") +
+                      "[[stage]]\nkind = \"release\"\n"),
+            "accepted");
 }
 
 TEST(CaseStages, GrowthNeedsClosedSides) {
-  expect_error(replaced("kind = \"fill\"", "kind = \"fill\"\nmethod = \"grow\"\nporosity = 0.5", replaced("height = \"80 mm\"", "height = \"80 mm\"\nsides = \"open\"")),
+  expect_error(replaced("kind = \"fill\"", "kind = \"fill\"\nmethod = \"grow\"\nporosity = 0.5",
+                        replaced("height = \"80 mm\"", "height = \"80 mm\"\nsides = \"open\"")),
                "case.toml:17:8: stage.fill: fill by growth needs closed sides");
 }
 

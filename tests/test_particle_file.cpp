@@ -27,7 +27,9 @@ void refused(const std::string& bytes, const std::string& begin, const std::stri
 }
 
 TEST(ParticleFile, ColumnsInAnyOrder) {
-  const ParticleFile file = parse("\xef\xbb\xbf# a comment\r\n\r\n z , y,x,radius,vx,wz,id,density\r\n 3,2,+1,0.5,-1e-3,7,42,2000\r\n# more\n6,5,4,0.25,0,0,41,1000");
+  const ParticleFile file = parse(
+      "\xef\xbb\xbf# a comment\r\n\r\n z , y,x,radius,vx,wz,id,density\r\n 3,2,+1,0.5,-1e-3,7,42,2000\r\n# "
+      "more\n6,5,4,0.25,0,0,41,1000");
   ASSERT_TRUE(file.problems.empty()) << file.problems.front();
   ASSERT_EQ(file.table.size(), 2u);
   EXPECT_EQ(file.table.x, (std::vector<double>{1, 4}));
@@ -88,7 +90,8 @@ TEST(ParticleFile, AnyBytesAreSafe) {
       bytes += random() % 2 != 0 ? "0123456789.,-+e\n# xyz"[random() % 21] : static_cast<char>(random() % 256);
     }
     const ParticleFile file = parse(bytes);
-    if (file.problems.empty()) check_particle_positions(file, "p.csv", BoxSpec{true, 3.0, 4.0, 5.0, Sides::periodic}, true, true);
+    if (file.problems.empty())
+      check_particle_positions(file, "p.csv", BoxSpec{true, 3.0, 4.0, 5.0, Sides::periodic}, true, true);
   }
 }
 
@@ -102,7 +105,8 @@ std::vector<std::string> positions(const std::string& rows, Sides sides, bool pl
 
 TEST(ParticlePositions, SidesAndPlates) {
   EXPECT_TRUE(positions("0,0,1,1\n9.9,11.9,19.9,1\n5,5,10,1\n", Sides::open).empty());
-  EXPECT_EQ(positions("10,5,5,1\n", Sides::periodic).at(0), "p.csv:2: x: particle 0 at 10 m is outside the periodic box; allowed: 0 <= x < 10 m");
+  EXPECT_EQ(positions("10,5,5,1\n", Sides::periodic).at(0),
+            "p.csv:2: x: particle 0 at 10 m is outside the periodic box; allowed: 0 <= x < 10 m");
   EXPECT_EQ(positions("5,-0.1,5,1\n", Sides::periodic).at(0).substr(0, 30), "p.csv:2: y: particle 0 at -0.1");
   EXPECT_TRUE(positions("0,0,5,1\n", Sides::periodic).empty());
   EXPECT_NE(positions("0,5,5,1\n", Sides::walls).at(0).find("beyond a wall"), std::string::npos);
@@ -135,7 +139,8 @@ TEST(ParticlePositions, GridAgreesWithAllPairs) {
     const double shift = periodic ? 0.0 : uniform(-1e6, 1e6);
     for (int i = 0; i < 40; ++i) {
       t.id.push_back(i);
-      t.x.push_back(uniform(0.0, b.width) + shift), t.y.push_back(uniform(0.0, b.depth)), t.z.push_back(uniform(1.0, 30.0));
+      t.x.push_back(uniform(0.0, b.width) + shift), t.y.push_back(uniform(0.0, b.depth)),
+          t.z.push_back(uniform(1.0, 30.0));
       t.radius.push_back(std::pow(10.0, uniform(-1.5, 0.2)));
       file.line.push_back(static_cast<std::size_t>(i) + 2);
     }
@@ -145,7 +150,8 @@ TEST(ParticlePositions, GridAgreesWithAllPairs) {
         double dx = t.x[i] - t.x[j], dy = t.y[i] - t.y[j];
         const double dz = t.z[i] - t.z[j];
         if (periodic) dx -= b.width * std::round(dx / b.width), dy -= b.depth * std::round(dy / b.depth);
-        expected += t.radius[i] + t.radius[j] - std::sqrt(dx * dx + dy * dy + dz * dz) > std::min(t.radius[i], t.radius[j]);
+        expected +=
+            t.radius[i] + t.radius[j] - std::sqrt(dx * dx + dy * dy + dz * dz) > std::min(t.radius[i], t.radius[j]);
       }
     }
     const std::vector<std::string> found = check_particle_positions(file, "p.csv", b, false, false);
@@ -165,8 +171,8 @@ class ParticleFileInCase : public ::testing::Test {
     return test::errors_of(text, overrides, folder_.string());
   }
   std::filesystem::path folder_;
-  std::string case_ = test::replaced("[[stage]]\nkind = \"fill\"\n", "",
-                                     test::replaced("count = 100", "file = \"p.csv\""));
+  std::string case_ =
+      test::replaced("[[stage]]\nkind = \"fill\"\n", "", test::replaced("count = 100", "file = \"p.csv\""));
 };
 
 TEST_F(ParticleFileInCase, IsReadRelativeToTheCase) {
@@ -182,7 +188,8 @@ TEST_F(ParticleFileInCase, IsReadRelativeToTheCase) {
 
 TEST_F(ParticleFileInCase, RadiusAndDensityFromColumns) {
   write("x,y,z,radius,density\n0.01,0.01,0.01,1e-3,900\n0.01,0.01,0.03,2e-3,800\n");
-  const std::string text = test::replaced("radius = \"2.5 mm\"\n", "", test::replaced("density = \"2000 kg/m3\"\n", "", case_));
+  const std::string text =
+      test::replaced("radius = \"2.5 mm\"\n", "", test::replaced("density = \"2000 kg/m3\"\n", "", case_));
   const Case c = parse_case(text, "case.toml", folder_);
   EXPECT_EQ(c.particles.sizes.largest(), 2e-3);
   EXPECT_EQ(c.particles.sizes.smallest(), 1e-3);
@@ -195,12 +202,14 @@ TEST_F(ParticleFileInCase, MissingOrUnreadable) {
   std::filesystem::create_directory(folder_ / "p.csv");
   EXPECT_NE(errors(case_).find("is not a file"), std::string::npos);
   std::filesystem::remove(folder_ / "p.csv");
-  EXPECT_EQ(test::errors_of(case_, {}, folder_.string(), CaseUse::resume), "accepted") << "a resumed run needs no particle file";
+  EXPECT_EQ(test::errors_of(case_, {}, folder_.string(), CaseUse::resume), "accepted")
+      << "a resumed run needs no particle file";
 }
 
 TEST_F(ParticleFileInCase, ErrorsNameFileAndLine) {
   write("x,y,z\n0.01,0.01,0.01\n0.01,0.01\n");
-  EXPECT_EQ(errors(case_), (folder_ / "p.csv").string() + ":3: 2 cells, but the header has 3; allowed: one cell for each column");
+  EXPECT_EQ(errors(case_),
+            (folder_ / "p.csv").string() + ":3: 2 cells, but the header has 3; allowed: one cell for each column");
   write("x,y,z\n0.01,0.01,0.09\n");
   EXPECT_EQ(errors(case_).substr(0, (folder_ / "p.csv").string().size() + 3), (folder_ / "p.csv").string() + ":2:");
 }
@@ -208,8 +217,12 @@ TEST_F(ParticleFileInCase, ErrorsNameFileAndLine) {
 TEST_F(ParticleFileInCase, StandsAlone) {
   write("x,y,z\n0.01,0.01,0.01\n");
   EXPECT_EQ(errors(case_), "accepted");
-  EXPECT_EQ(errors(case_, {"particles.count=1"}), "--set particles.count=1: particles.count: is given beside file; allowed: leave it out, the file says how many there are");
-  EXPECT_NE(errors(case_, {"particles.sizes={ kind = \"uniform\", min = 1, max = 2 }"}).find("particles.sizes: is given beside"), std::string::npos);
+  EXPECT_EQ(errors(case_, {"particles.count=1"}),
+            "--set particles.count=1: particles.count: is given beside file; allowed: leave it out, the file says how "
+            "many there are");
+  EXPECT_NE(errors(case_, {"particles.sizes={ kind = \"uniform\", min = 1, max = 2 }"})
+                .find("particles.sizes: is given beside"),
+            std::string::npos);
   EXPECT_EQ(errors(case_ + "[[stage]]\nkind = \"fill\"\n").substr(0, 26), "case.toml:20:8: stage.fill");
 }
 

@@ -87,8 +87,7 @@ TEST(Units, AnyBytesAreSafe) {
     for (std::size_t n = random() % 12; n > 0; --n) text += static_cast<char>(random() % 256);
     try {
       EXPECT_TRUE(std::isfinite(to_si(text, static_cast<Quantity>(random() % 9))));
-    } catch (const UnitError&) {
-    }
+    } catch (const UnitError&) {}
   }
 }
 
@@ -99,19 +98,18 @@ TEST(Units, PowersOfTenCostNoPrecision) {
     Quantity quantity;
     int power;
   };
-  constexpr Row rows[] = {{"mm", Quantity::length, -3},      {"um", Quantity::length, -6},
-                          {"nm", Quantity::length, -9},      {"cm", Quantity::length, -2},
-                          {"kN/m", Quantity::stiffness, 3},  {"kPa", Quantity::stress, 3},
-                          {"MPa", Quantity::stress, 6},      {"GPa", Quantity::stress, 9},
-                          {"us", Quantity::time, -6},        {"ms", Quantity::time, -3},
-                          {"mm/s", Quantity::speed, -3},     {"mN", Quantity::force, -3},
-                          {"kHz", Quantity::frequency, 3},   {"g/cm3", Quantity::density, 3},
-                          {"mm/s2", Quantity::acceleration, -3}};
+  constexpr Row rows[] = {
+      {"mm", Quantity::length, -3},    {"um", Quantity::length, -6},     {"nm", Quantity::length, -9},
+      {"cm", Quantity::length, -2},    {"kN/m", Quantity::stiffness, 3}, {"kPa", Quantity::stress, 3},
+      {"MPa", Quantity::stress, 6},    {"GPa", Quantity::stress, 9},     {"us", Quantity::time, -6},
+      {"ms", Quantity::time, -3},      {"mm/s", Quantity::speed, -3},    {"mN", Quantity::force, -3},
+      {"kHz", Quantity::frequency, 3}, {"g/cm3", Quantity::density, 3},  {"mm/s2", Quantity::acceleration, -3}};
   std::mt19937_64 random(7);
   for (int i = 0; i < 5000; ++i) {
     const Row& row = rows[random() % std::size(rows)];
     const int digits_after = static_cast<int>(random() % 6), exponent = static_cast<int>(random() % 13) - 6;
-    std::string number = std::to_string(random() % 1000) + "." + std::to_string(random() % 1000000).substr(0, 1u + static_cast<unsigned>(digits_after));
+    std::string number = std::to_string(random() % 1000) + "." +
+                         std::to_string(random() % 1000000).substr(0, 1u + static_cast<unsigned>(digits_after));
     const std::string written = exponent == 0 ? number : number + "e" + std::to_string(exponent);
     const std::string si = number + "e" + std::to_string(exponent + row.power);
     EXPECT_EQ(to_si(written + " " + row.unit, row.quantity), std::stod(si)) << written << " " << row.unit;
