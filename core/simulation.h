@@ -145,6 +145,9 @@ class Simulation {
   int prepare_lists(std::int64_t wanted);
   double plane_path(int steps) const;
   void run_chunk(int steps);
+  bool keeps_k_t() const {  // kernels for other exponents remember k_t
+    return built_scenes[static_cast<std::size_t>(kernels_.scene)].traits.exponent != Exponent::one;
+  }
   void save();
   void restore();
   void mean_velocity();

@@ -144,7 +144,7 @@ void Simulation::prune_lists() {
   keep_sums(sums);
   const auto plates = plate_history(batches_, particles_);
   const auto run = [this](int count, const std::function<void(int)>& body) { parallel(count, body); };
-  prune(batches_, particles_, domain_, gap_, pair_.exponent != 1.0, run);
+  prune(batches_, particles_, domain_, gap_, keeps_k_t(), run);
   list_plates(batches_, particles_, planes_, step_, plate_gap_, plates, run);
   put_sums(sums);
   remember(at_prune_, drift_at_prune_);
@@ -170,7 +170,7 @@ void Simulation::rebuild_with(std::vector<PairHistory> pairs) {
   graph_.reset();
   table_.reset();
   batches_ = make_batches(particles_, domain_, skin_, engine_.batch > 0 ? engine_.batch : automatic, run);
-  fill_inner(batches_, particles_, domain_, gap_, pair_.exponent != 1.0, pairs, run);
+  fill_inner(batches_, particles_, domain_, gap_, keeps_k_t(), pairs, run);
   list_plates(batches_, particles_, planes_, step_, plate_gap_, plates, run);
   merged_.assign(batches_.size(), 1);
   if (had_forces) put_sums(sums);
