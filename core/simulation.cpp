@@ -12,6 +12,7 @@
 #include <numeric>
 
 #include "core/float_mode.h"
+#include "core/law_constants.h"
 #include "core/simulation_detail.h"
 
 namespace platen {
@@ -117,26 +118,10 @@ void Simulation::setup_laws(const SimulationSetup& setup) {
     for (std::int32_t k = 0; k < particles_.count; ++k) largest = std::max(largest, particles_.mass_of(k));
     return largest;
   }();
-  const auto damping = [](double e) {
-    if (e >= 1.0) return 0.0;
-    const double ratio = 3.14159265358979323846 / std::log(e);
-    return 1.0 / (1.0 + ratio * ratio);  // z
-  };
   LawConstants& c = law_;
-  c.k1 = pair_.k1, c.k2 = pair_.k2, c.k_adh = pair_.k_adh, c.f0 = pair_.f0, c.exponent = n;
-  c.sp_lower = 1.0 - c.k1 / c.k2;
-  c.sp_upper = 1.0 + c.k_adh / c.k2;
-  c.mu = pair_.friction, c.mu_r = pair_.rolling_friction;
-  c.ratio = pair_.tangential_ratio;
-  c.k_t = c.ratio * c.k1;
-  c.half_over_k_t = c.k_t > 0.0 ? 0.5 / c.k_t : 0.0;
-  c.damping = 4.0 * damping(pair_.restitution) * ((n + 1.0) / (2.0 * n));
-  c.beta_ratio = std::sqrt(c.ratio);
+  c = pair_constants(pair_);
   c.beta_n = std::sqrt(c.damping * ((m * m) / (m + m)) * c.k1);
   c.overlap_floor = n < 1.0 ? 1e-3 * smallest_radius_ : 0.0;
-  const double power = (n + 1.0) / n;
-  c.plastic_loading = c.sp_lower > 0.0 ? c.k2 * (std::pow(c.sp_lower, -1.0 / n) - 1.0) / power : 0.0;
-  c.plastic_adhesive = c.k2 * (std::pow(c.sp_upper, -1.0 / n) - 1.0) / power;
   c.radius = particles_.common_radius, c.inverse_radius = 1.0 / particles_.common_radius;
   c.width = domain_.width, c.depth = domain_.depth;
   c.inverse_width = c.width > 0.0 ? 1.0 / c.width : 0.0;
@@ -159,17 +144,7 @@ void Simulation::setup_laws(const SimulationSetup& setup) {
   energy_unit_ = E * 0x1p-60;
 
   PlateConstants& p = plate_law_;
-  const double nu_s = plate_parameters_.particle_poisson_ratio, nu_p = plate_parameters_.poisson_ratio;
-  const double E_s = plate_parameters_.particle_young_modulus, E_p = plate_parameters_.young_modulus;
-  const double G_s = E_s / (2.0 * (1.0 + nu_s)), G_p = E_p / (2.0 * (1.0 + nu_p));
-  const double E_star = 1.0 / ((1.0 - nu_s * nu_s) / E_s + (1.0 - nu_p * nu_p) / E_p);
-  const double G_star = 1.0 / ((2.0 - nu_s) / G_s + (2.0 - nu_p) / G_p);
-  p.hertz = 4.0 / 3.0 * E_star;
-  p.stiffness_n = 2.0 * E_star;
-  p.stiffness_t = 8.0 * G_star;
-  p.damping = 4.0 * (5.0 / 6.0) * damping(plate_parameters_.restitution);
-  p.mu = plate_parameters_.friction, p.mu_r = plate_parameters_.rolling_friction;
-  p.slip_ratio = p.mu * p.hertz / p.stiffness_t;
+  p = plate_constants(plate_parameters_);
   const double plate_slope = p.stiffness_n * std::sqrt(R * deep);
   const double plate_speed = R * std::sqrt(plate_slope / heaviest);
   const double F_p = power_of_two_above(p.hertz * std::sqrt(R * deep) * deep +

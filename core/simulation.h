@@ -97,7 +97,8 @@ class Simulation {
 
   void advance(std::int64_t steps);
 
-  Measures measure();
+  // Everything, or without what costs a pass over all pairs: the stored energies and the residual.
+  Measures measure(bool stored_energies = true);
   // stress on top and bottom alone [Pa]; cheaper than measure().
   double stress(int plate);
   Snapshot snapshot(bool with_contacts = true);
@@ -111,6 +112,7 @@ class Simulation {
   void count_inserted();
 
   std::int32_t particles() const { return particles_.count; }
+  double mean_radius() const;
   double area() const { return width_ * depth_; }
   const KernelTable& kernels() const { return kernels_; }
   const EngineCounters& counters() const { return counters_; }

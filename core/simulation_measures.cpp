@@ -96,7 +96,13 @@ double Simulation::stress(int plate) {
   return shape.sign * force.value() / area();
 }
 
-Measures Simulation::measure() {
+double Simulation::mean_radius() const {
+  double sum = 0.0;
+  for (const std::int32_t place : particles_.place) sum += particles_.radius_of(place);
+  return particles_.count > 0 ? sum / particles_.count : 0.0;
+}
+
+Measures Simulation::measure(bool stored_energies) {
   const FloatMode mode;
   ensure_forces();
   struct Part {
@@ -110,6 +116,7 @@ Measures Simulation::measure() {
   };
   std::vector<Part> parts(batches_.size(), Part(energy_unit_, plate_force_unit_));
   const double half = 0.5 * last_drift_;
+  const bool with_ledger = stored_energies && engine_.energy;
   parallel(static_cast<int>(batches_.size()), [&](int index) {
     Batch& b = batches_[static_cast<std::size_t>(index)];
     Part& part = parts[static_cast<std::size_t>(index)];
@@ -136,10 +143,10 @@ Measures Simulation::measure() {
       part.weight.add(m * gravity_);
       part.highest = std::max(part.highest, p.z[k] + R);
     }
-    if (engine_.energy) add_pairs(b, p, domain_, law_, part.pairs);
+    if (with_ledger) add_pairs(b, p, domain_, law_, part.pairs);
     for (int plate = 0; plate < plate_count; ++plate) {
       const PlateList& list = b.plates[plate];
-      if (engine_.energy) add_plate_energy(list, plate_law_, part.plate_energy, p);
+      if (with_ledger) add_plate_energy(list, plate_law_, part.plate_energy, p);
       for (std::size_t k = 0; k < static_cast<std::size_t>(list.used); ++k) {
         const double fz = list.records[record_size * k + 2];
         part.support.add(fz);
@@ -178,7 +185,7 @@ Measures Simulation::measure() {
   const double potential = all.potential.value();  // from z = 0, for the ledger
   r.potential_energy = potential - r.weight * z_bottom;
   Ledger& l = r.ledger;
-  if (engine_.energy) {
+  if (with_ledger) {
     const auto joule = [this](Int128 quanta) { return static_cast<double>(quanta) / law_.energy.inverse; };
     l.elastic_energy = all.pairs.elastic.value(), l.adhesion_energy = all.pairs.adhesion.value();
     l.tangential_energy = all.pairs.tangential.value(), l.plate_energy = all.plate_energy.value();

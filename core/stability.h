@@ -48,7 +48,7 @@ struct StepLimits {
 
 struct StepLimitOptions {
   int max_iterations = 40;   // of Lanczos' method for one eigenvalue
-  double tolerance = 2e-3;   // relative error bound of an eigenvalue at which it stops earlier
+  double tolerance = 1e-3;   // relative error bound of an eigenvalue at which it stops earlier, after 24 at least
   bool damped = true;        // false: dt_limit is left at dt_crit
   double dt_guess = 0.0;     // a dt_limit found before, which saves about half of the passes; 0: none [s]. The answer
                              // depends on it within the tolerance, so it has to be part of the state

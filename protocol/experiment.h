@@ -66,6 +66,9 @@ struct FirstStep {
 };
 FirstStep first_step(const Case& c);
 
+// Throws CaseError where a fixed time.step is above 0.9 dt_limit and time.allow_unstable is not set.
+void refuse_unstable_step(const Case& c);
+
 // Runs all stages. Failures of the run itself (RunError, stop requests, goals not reached) are in the outcome, with the
 // data so far written; OutputError is thrown.
 RunOutcome run_experiment(const Case& c, RunFolder& folder, const RunOptions& options);

@@ -212,9 +212,11 @@ GrownBed grow_bed(const std::vector<double>& radii, double width, double depth, 
     largest = std::max(largest, R);
   }
   bed.height = 4.0 / 3.0 * std::numbers::pi * cubes / (width * depth * (1.0 - porosity));
-  const double narrowest = std::min({width, depth, bed.height});
-  if (!(narrowest >= 2.0 * largest * (1.0 + spare)))
-    throw std::invalid_argument("grow: the box, or the bed, is narrower than the largest sphere");
+  // Where a periodic box is less than two diameters wide, a sphere meets another one from both sides at once.
+  const double diameter = 2.0 * largest * (1.0 + spare), sideways = periodic ? 2.0 * diameter : diameter;
+  if (!(std::min(width, depth) >= sideways && bed.height >= diameter))
+    throw std::invalid_argument(
+        "grow: the box, or the bed, is too narrow for the largest sphere (two diameters in a periodic box, else one)");
 
   bed.position.resize(3 * radii.size());
   const double box[3] = {width, depth, bed.height};

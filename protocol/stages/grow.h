@@ -20,9 +20,10 @@ struct GrownBed {
 // radii are aimed at with 0.05 % to spare, so a bed that is reached usually has no overlap at all.
 //
 // Random equal spheres jam at a porosity of about 0.36 [OHern2003], earlier between close plates or walls; what cannot
-// be had is reported by `reached`, and the position is the best that was found. Serial, and free of libm: same seed,
-// same bits. Throws std::invalid_argument for a porosity outside (0, 1), or a box or bed narrower than the largest
-// sphere.
+// be had is reported by `reached`. Serial, and nothing of libm but square roots: same seed, same bits.
+//
+// Throws std::invalid_argument for a porosity outside (0, 1), and for a bed or box narrower than the largest sphere (a
+// periodic box: than two of them).
 GrownBed grow_bed(const std::vector<double>& radii, double width, double depth, bool periodic, double porosity,
                   RandomSource& random);
 

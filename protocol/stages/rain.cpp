@@ -101,7 +101,7 @@ std::vector<double> rain_positions(const std::vector<double>& radii, double widt
     throw std::invalid_argument("rain: the solid fraction must be between 0 and 0.34");
 
   // Where nothing is free any more for so many tries, the layer is as good as full.
-  constexpr int tries = 400;
+  constexpr int tries = 2000;
   const double layer_height = 6.0 * largest;
   const double layer_solid = solid_fraction * width * depth * layer_height;
   Gas gas(radii, largest, width, depth, periodic, z_floor);

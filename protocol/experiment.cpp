@@ -1,0 +1,309 @@
+#include "protocol/experiment.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "protocol/stages.h"
+
+namespace platen {
+
+namespace {
+
+constexpr std::int64_t limits_every = 8192;  // steps between two looks at the limits of the time step
+
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+class Experiment {
+ public:
+  Experiment(const Case& c, RunFolder& folder, const RunOptions& options)
+      : c_(c), folder_(folder), options_(options), wall_begin_(now()) {}
+
+  RunOutcome run() {
+    RunOutcome outcome;
+    try {
+      sim_ = make_simulation(c_, options_.threads, options_.reproducible);
+      describe_run();
+      for (std::size_t k = 0; k < c_.stages.size(); ++k) {
+        const End end = run_stage(k);
+        if (end == End::goal_missed) {
+          outcome.exit_code = exit_goal;
+          outcome.message = fmt::format("stage {}: {}", closed_.back().name, closed_.back().end_reason);
+          break;
+        }
+        if (end == End::stopped) {
+          outcome.exit_code = exit_stopped;
+          outcome.message = fmt::format("stopped in stage {}: {}", closed_.back().name, closed_.back().end_reason);
+          break;
+        }
+        if (c_.stages[k].name == options_.stop_after) break;
+      }
+      outcome.state_hash = sim_->state_hash(stage_state());
+    } catch (const RunError& error) {
+      outcome.exit_code = exit_numerical;
+      outcome.message = error.what();
+      if (!closed_.empty() || stage_open_) {
+        StageResult failed = current_;
+        failed.end_reason = "failed";
+        failed.reached = false;
+        if (stage_open_) closed_.push_back(failed);
+      }
+      folder_.log("failed", {{"message", outcome.message}}, LogLevel::error);
+    }
+    outcome.stages = closed_;
+    outcome.performance = performance();
+    folder_.finish(outcome.exit_code, outcome.exit_code == exit_numerical ? std::nullopt : std::optional(outcome.state_hash),
+                   outcome.performance, outcome.stages);
+    folder_.log("end", {{"exit_code", outcome.exit_code}, {"wall_seconds", now() - wall_begin_}});
+    return outcome;
+  }
+
+ private:
+  enum class End { done, goal_missed, stopped };
+
+  void describe_run() {
+    const KernelTable& kernels = sim_->kernels();
+    RunInfo info;
+    info.title = c_.title, info.seed = c_.seed, info.threads = options_.threads;
+    info.instruction_set = to_string(kernels.instruction_set);
+    info.scene = built_scenes[static_cast<std::size_t>(kernels.scene)].name;
+    info.contacts = c_.output.contacts;
+    folder_.set_info(info);
+    folder_.log("start", {{"title", c_.title}, {"spheres", static_cast<std::int64_t>(sim_->particles())},
+                          {"threads", options_.threads}, {"instruction_set", info.instruction_set}, {"scene", info.scene},
+                          {"dt", sim_->time_step()}});
+  }
+
+  Performance performance() const {
+    Performance p;
+    p.threads = options_.threads;
+    p.wall_seconds = now() - wall_begin_;
+    if (!sim_) return p;
+    p.instruction_set = to_string(sim_->kernels().instruction_set);
+    p.scene = built_scenes[static_cast<std::size_t>(sim_->kernels().scene)].name;
+    p.particle_steps = sim_->step() * sim_->particles();
+    p.rebuilds = sim_->counters().rebuilds;
+    return p;
+  }
+
+  // What the hash must cover besides the bed: where the protocol stands.
+  std::string stage_state() const {
+    return fmt::format("{} {:a} {:a}", closed_.size(), sim_->time_step(), strain_zero_height_.value_or(-1.0));
+  }
+
+  SeriesRow row_of(const Measures& m, double speed) const {
+    SeriesRow row;
+    row.stage = current_.name;
+    row.measures = m;
+    row.kinetic_to_potential = m.potential_energy != 0.0 ? m.kinetic_energy / m.potential_energy : std::numeric_limits<double>::quiet_NaN();
+    if (strain_zero_height_) row.strain = 1.0 - m.height / *strain_zero_height_;
+    // I = strain rate * d * sqrt(rho/p) [A34]; no meaning without pressure.
+    row.inertial_number = std::numeric_limits<double>::quiet_NaN();
+    if (m.stress_top > 0.0 && m.height > 0.0) {
+      const double rho = c_.particles.table ? c_.particles.table->density.front() : c_.particles.density;
+      row.inertial_number = speed / m.height * 2.0 * sim_->mean_radius() * std::sqrt(rho / m.stress_top);
+    }
+    if (!c_.output.energy) {
+      const double none = std::numeric_limits<double>::quiet_NaN();
+      Measures& r = row.measures;
+      r.energy_residual = none;
+      r.ledger = {none, none, none, none, none, none, none, none, none, none, none, none};
+    }
+    return row;
+  }
+
+  void sample(std::size_t stage, double speed) {
+    current_.last = row_of(sim_->measure(), speed);
+    folder_.append(current_.last, static_cast<int>(stage));
+  }
+
+  // Steps from now to the first one at or after the next multiple of the sampling interval.
+  std::int64_t steps_to_sample() const {
+    const double dt = sim_->time_step(), interval = c_.output.series;
+    const double done = std::floor(sim_->time() / interval * (1.0 + 1e-12) + 1e-9);
+    return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(((done + 1.0) * interval - sim_->time()) / dt - 1e-6)));
+  }
+
+  // The automatic step, or the watch over a fixed one.
+  void watch_time_step() {
+    const StepLimits limits = sim_->step_limits();
+    const Measures m = sim_->measure(false);
+    if (c_.time.step) {
+      const double ratio = sim_->time_step() / limits.dt_limit;
+      if (ratio > 1.0 && !c_.time.allow_unstable)
+        throw RunError(fmt::format("the time step {:.4g} s is above dt_limit = {:.4g} s of the bed at step {}; use a smaller time.step or \"auto\"",
+                                   sim_->time_step(), limits.dt_limit, sim_->step()));
+      if (ratio > 0.9) warn(fmt::format("time step at {:.2f} dt_limit", ratio));
+      return;
+    }
+    StepLimits ruling = limits;
+    const StepLimits free = first_step(c_).limits;
+    // A loose bed says nothing of the dense one that it is about to become.
+    if (m.coordination_number < 3.0) ruling.dt_crit = std::min(ruling.dt_crit, free.dt_crit), ruling.dt_limit = std::min(ruling.dt_limit, free.dt_limit);
+    sim_->set_time_step(floor_to_grid(std::min(c_.time.safety * ruling.dt_crit, 0.8 * ruling.dt_limit)));
+  }
+
+  void warn(const std::string& text) {
+    if (std::find(current_.warnings.begin(), current_.warnings.end(), text) != current_.warnings.end()) return;
+    current_.warnings.push_back(text);
+    folder_.log("warning", {{"stage", current_.name}, {"message", text}}, LogLevel::warning);
+  }
+
+  // Why the run must stop now, if it must.
+  std::optional<std::string> stop_request() const {
+    if (options_.stop_signal && options_.stop_signal->load() != 0) return fmt::format("signal {}", options_.stop_signal->load());
+    if (options_.max_walltime && now() - wall_begin_ > *options_.max_walltime)
+      return fmt::format("wall time of {:.4g} s is over", *options_.max_walltime);
+    return std::nullopt;
+  }
+
+  End run_stage(std::size_t index) {
+    const StageSpec& spec = c_.stages[index];
+    const double stage_begin = now();
+    current_ = StageResult{};
+    current_.name = spec.name, current_.kind = spec.kind;
+    current_.first_step = sim_->step(), current_.time_begin = sim_->time();
+    current_.particles = sim_->particles();
+    stage_open_ = true;
+
+    Stand stand{*sim_, c_, spec, sim_->step(), sim_->time(), strain_zero_height_};
+    Stage stage = make_stage(spec);
+    std::visit([&](auto& s) { s.begin(stand); }, stage);
+    if (spec.kind != StageKind::unload && spec.kind != StageKind::hold) stand.strain_zero_height.reset();
+    strain_zero_height_ = stand.strain_zero_height;
+    const double speed = spec.speed;
+    sample(index, speed);
+
+    End end = End::done;
+    std::int64_t next_sample = sim_->step() + steps_to_sample();
+    const std::int64_t grid = c_.engine.check_every;
+    for (;;) {
+      // On the grid, in absolute step numbers: goals, servo, time step. A stage that needs no time ends at its first look.
+      const auto exact = std::visit([&](auto& s) { return s.last_step(stand); }, stage);
+      const bool first_look = sim_->step() == stand.first_step, on_grid = sim_->step() % grid == 0;
+      bool over = false;
+      if (on_grid || first_look) {
+        const Measures m = sim_->measure(false);
+        Look look{m, stand.strain_zero_height ? 1.0 - m.height / *stand.strain_zero_height : std::numeric_limits<double>::quiet_NaN()};
+        std::visit([&](auto& s) { s.update(stand, look); }, stage);
+        strain_zero_height_ = stand.strain_zero_height;
+        if (strain_zero_height_) look.strain = 1.0 - m.height / *strain_zero_height_;
+        if (!first_look || spec.kind == StageKind::fill)
+          if (const auto reason = std::visit([&](auto& s) { return s.done(stand, look); }, stage)) current_.end_reason = *reason, over = true;
+        guard(m);
+        if (on_grid && !first_look && sim_->step() % limits_every == 0) {
+          watch_time_step();
+          next_sample = sim_->step() + steps_to_sample();
+        }
+      }
+      if (!over && exact && sim_->step() >= *exact) over = true, current_.end_reason = exact_reason(spec);
+      if (!over && stand.stage_time() >= spec.max_duration) {
+        over = true, end = End::goal_missed;
+        current_.reached = false;
+        current_.end_reason = fmt::format("goal not reached within max_duration = {:.4g} s", spec.max_duration);
+      }
+      if (!over) {
+        if (const auto why = stop_request()) over = true, end = End::stopped, current_.end_reason = *why, current_.reached = false;
+      }
+      if (over) break;
+
+      if (sim_->step() >= next_sample) {
+        sample(index, speed);
+        next_sample = sim_->step() + steps_to_sample();
+      }
+      std::int64_t target = (sim_->step() / grid + 1) * grid;
+      if (exact) target = std::min(target, std::max(*exact, sim_->step() + 1));
+      target = std::min(target, next_sample);
+      const auto longest = sim_->step() + static_cast<std::int64_t>(std::ceil((spec.max_duration - stand.stage_time()) / sim_->time_step()));
+      target = std::min(target, std::max(longest, sim_->step() + 1));
+      sim_->advance(target - sim_->step());
+      show_progress(index, stand, exact, stage_begin);
+    }
+
+    sample(index, speed);
+    close(index, stand, stage, stage_begin, end);
+    return end;
+  }
+
+  void close(std::size_t, Stand& stand, Stage& stage, double stage_begin, End end) {
+    current_.last_step = sim_->step(), current_.time_end = sim_->time();
+    current_.wall_seconds = now() - stage_begin;
+    current_.strain_zero_height = strain_zero_height_;
+    const Snapshot snapshot = sim_->snapshot(c_.output.contacts);
+    const Profile heights = sim_->area() > 0.0 ? profile(snapshot, sim_->area(), c_.output.slabs) : Profile{};
+    if (end != End::stopped) std::visit([&](auto& s) { s.end(stand, current_); }, stage);
+    closed_.push_back(current_);
+    stage_open_ = false;
+    folder_.close_stage(current_, snapshot, heights);
+    folder_.log("stage", {{"name", current_.name}, {"end_reason", current_.end_reason}, {"steps", current_.last_step - current_.first_step},
+                          {"wall_seconds", current_.wall_seconds}});
+    if (options_.stage_closed) options_.stage_closed(current_);
+  }
+
+  static std::string exact_reason(const StageSpec& spec) {
+    if (spec.until.displacement && !spec.until.duration) return fmt::format("displacement {} done", pretty(*spec.until.displacement, "m"));
+    const double duration = spec.duration.value_or(spec.until.duration.value_or(0.0));
+    return fmt::format("duration {} over", pretty(duration, "s"));
+  }
+
+  // Things that must not go unnoticed although every number is still finite.
+  void guard(const Measures& m) {
+    if (!std::isfinite(m.kinetic_energy) || !std::isfinite(m.potential_energy))
+      throw RunError(fmt::format("energy is not a number at step {}", m.step));
+    const bool quasi_static = current_.kind == StageKind::compress || current_.kind == StageKind::crush;
+    if (quasi_static && m.stress_top > 1e3) {
+      const double I = row_of(m, c_.stages[closed_.size()].speed).inertial_number;
+      if (I > 1e-3) warn("inertial number above 1e-3 at more than 1 kPa: not quasi-static");
+    }
+  }
+
+  void show_progress(std::size_t index, const Stand& stand, const std::optional<std::int64_t>& exact, double stage_begin) {
+    const double t = now();
+    if (!options_.progress || t - last_progress_ < 0.2) return;
+    Progress p;
+    p.stage = current_.name;
+    p.stage_number = static_cast<int>(index) + 1, p.stages = static_cast<int>(c_.stages.size());
+    p.step = sim_->step(), p.time = sim_->time(), p.stage_time = stand.stage_time();
+    const StageSpec& spec = c_.stages[index];
+    const SeriesRow& row = current_.last;
+    if (exact)
+      p.fraction = static_cast<double>(sim_->step() - stand.first_step) / static_cast<double>(std::max<std::int64_t>(1, *exact - stand.first_step));
+    else if (spec.kind == StageKind::compress && spec.until.stress)
+      p.fraction = std::sqrt(std::clamp(row.measures.stress_top / *spec.until.stress, 0.0, 1.0));  // stress grows ever faster
+    else if (spec.kind == StageKind::crush && spec.until.strain && !std::isnan(row.strain))
+      p.fraction = std::clamp(row.strain / *spec.until.strain, 0.0, 1.0);
+    p.wall_seconds = t - wall_begin_;
+    if (p.fraction && *p.fraction > 0.02) p.seconds_left = (t - stage_begin) * (1.0 - *p.fraction) / *p.fraction;
+    const double steps = static_cast<double>(sim_->step() - progress_step_);
+    if (last_progress_ > 0.0) p.particle_steps_per_second = steps * sim_->particles() / (t - last_progress_);
+    p.row = row;
+    progress_step_ = sim_->step();
+    last_progress_ = t;
+    options_.progress(p);
+  }
+
+  const Case& c_;
+  RunFolder& folder_;
+  const RunOptions& options_;
+  double wall_begin_;
+  std::unique_ptr<Simulation> sim_;
+  std::vector<StageResult> closed_;
+  StageResult current_;
+  bool stage_open_ = false;
+  std::optional<double> strain_zero_height_;
+  double last_progress_ = 0.0;
+  std::int64_t progress_step_ = 0;
+};
+
+}  // namespace
+
+RunOutcome run_experiment(const Case& c, RunFolder& folder, const RunOptions& options) {
+  return Experiment(c, folder, options).run();
+}
+
+}  // namespace platen

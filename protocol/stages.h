@@ -1,0 +1,147 @@
+// The stages of the experiment. Each is a struct with
+//
+//   begin(stand)         puts planes and sides as the stage wants them
+//   update(stand, look)  on the check grid: servo, and whatever the stage remembers
+//   done(stand, look)    on the check grid: why the stage ends, or nothing
+//   last_step(stand)     the step at which it ends whatever else happens, where that is exact
+//   end(stand, result)   leaves the bed as the next stage expects it, adds its own figures to the result
+//
+// Equations: docs/laws.md, "The experiment".
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <limits>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/simulation.h"
+#include "protocol/case_file.h"
+#include "protocol/records.h"
+
+namespace platen {
+
+// What stages work on and hand to each other.
+struct Stand {
+  Simulation& sim;
+  const Case& c;
+  const StageSpec& spec;
+  std::int64_t first_step = 0;    // of the stage
+  double first_time = 0.0;        // [s]
+  std::optional<double> strain_zero_height;  // [m]; kept from compress to unload and hold
+  double stage_time() const { return sim.time() - first_time; }
+  std::int64_t step_at(double stage_seconds) const;  // nearest step to a time of the stage
+};
+
+// One look at the bed on the check grid; no stored energies.
+struct Look {
+  Measures m;
+  double strain = std::numeric_limits<double>::quiet_NaN();
+};
+
+// A stage that waits for rest: settle and release [A27].
+class RestWatch {
+ public:
+  void begin(Stand& stand);
+  std::optional<std::string> done(Stand& stand, const Look& look);
+
+ private:
+  struct Sample {
+    double time, coordination_number;
+    bool quiet;
+  };
+  std::deque<Sample> samples_;
+  double kinetic_at_start_ = 0.0;
+};
+
+struct FillStage {
+  void begin(Stand& stand);
+  void update(Stand&, const Look&) {}
+  std::optional<std::string> done(Stand& stand, const Look& look);
+  std::optional<std::int64_t> last_step(const Stand&) const { return std::nullopt; }
+  void end(Stand& stand, StageResult& result);
+};
+
+struct VibrateStage {
+  void begin(Stand& stand);
+  void update(Stand&, const Look&) {}
+  std::optional<std::string> done(Stand&, const Look&) { return std::nullopt; }
+  std::optional<std::int64_t> last_step(const Stand& stand) const;
+  void end(Stand& stand, StageResult& result);
+};
+
+struct SettleStage {
+  RestWatch rest;
+  void begin(Stand& stand) { rest.begin(stand); }
+  void update(Stand&, const Look&) {}
+  std::optional<std::string> done(Stand& stand, const Look& look) { return rest.done(stand, look); }
+  std::optional<std::int64_t> last_step(const Stand&) const { return std::nullopt; }
+  void end(Stand&, StageResult&) {}
+};
+
+// Moves the top plate: compress (down), unload (up).
+struct PressStage {
+  double direction = -1.0;  // of the plate
+  double start_position = 0.0;
+  void begin(Stand& stand);
+  void update(Stand& stand, const Look& look);
+  std::optional<std::string> done(Stand& stand, const Look& look);
+  std::optional<std::int64_t> last_step(const Stand& stand) const;
+  void end(Stand& stand, StageResult& result);
+};
+
+struct HoldStage {
+  void begin(Stand& stand);
+  void update(Stand& stand, const Look& look);
+  std::optional<std::string> done(Stand&, const Look&) { return std::nullopt; }
+  std::optional<std::int64_t> last_step(const Stand& stand) const;
+  void end(Stand& stand, StageResult& result);
+};
+
+struct ReleaseStage {
+  RestWatch rest;
+  void begin(Stand& stand);
+  void update(Stand&, const Look&) {}
+  std::optional<std::string> done(Stand& stand, const Look& look) { return rest.done(stand, look); }
+  std::optional<std::int64_t> last_step(const Stand&) const { return std::nullopt; }
+  void end(Stand&, StageResult&) {}
+};
+
+// Unconfined compression to failure: PressStage with a peak to find.
+struct CrushStage {
+  PressStage press;
+  struct Point {
+    double time, strain, stress;  // stress: as read
+  };
+  std::vector<Point> curve;       // from the strain zero on
+  double window_sum = 0.0;        // of the stresses of the last 5 ms
+  std::size_t window_begin = 0;
+  std::vector<double> smooth;     // 5 ms means, one per point [Pa]
+  double peak = 0.0, peak_strain = 0.0;
+  double low_since = std::numeric_limits<double>::quiet_NaN();  // strain since which the stress has been below the drop
+  bool dropped = false;
+  void begin(Stand& stand);
+  void update(Stand& stand, const Look& look);
+  std::optional<std::string> done(Stand& stand, const Look& look);
+  std::optional<std::int64_t> last_step(const Stand& stand) const { return press.last_step(stand); }
+  void end(Stand& stand, StageResult& result);
+};
+
+struct RunStage {
+  void begin(Stand&) {}
+  void update(Stand&, const Look&) {}
+  std::optional<std::string> done(Stand&, const Look&) { return std::nullopt; }
+  std::optional<std::int64_t> last_step(const Stand& stand) const;
+  void end(Stand&, StageResult&) {}
+};
+
+using Stage = std::variant<FillStage, VibrateStage, SettleStage, PressStage, HoldStage, ReleaseStage, CrushStage, RunStage>;
+
+Stage make_stage(const StageSpec& spec);
+
+// A pressure or length as people write it, for end reasons.
+std::string pretty(double value, const char* unit);
+
+}  // namespace platen

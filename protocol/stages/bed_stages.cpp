@@ -1,0 +1,112 @@
+// Stages that make a bed and bring it to rest: fill, vibrate, settle, run.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "protocol/stages.h"
+
+namespace platen {
+
+std::int64_t Stand::step_at(double stage_seconds) const {
+  // From here, so that a changing time step is accounted for.
+  return sim.step() + std::max<std::int64_t>(0, std::llround((stage_seconds - stage_time()) / sim.time_step()));
+}
+
+std::string pretty(double value, const char* unit) {
+  const double size = std::fabs(value);
+  if (size >= 1e3) return fmt::format("{:.4g} k{}", value / 1e3, unit);
+  if (size > 0.0 && size < 0.1) return fmt::format("{:.4g} m{}", value * 1e3, unit);
+  return fmt::format("{:.4g} {}", value, unit);
+}
+
+Stage make_stage(const StageSpec& spec) {
+  switch (spec.kind) {
+    case StageKind::fill: return FillStage{};
+    case StageKind::vibrate: return VibrateStage{};
+    case StageKind::settle: return SettleStage{};
+    case StageKind::compress: return PressStage{-1.0};
+    case StageKind::unload: return PressStage{+1.0};
+    case StageKind::hold: return HoldStage{};
+    case StageKind::release: return ReleaseStage{};
+    case StageKind::crush: return CrushStage{};
+    case StageKind::run: break;
+  }
+  return RunStage{};
+}
+
+// ------------------------------------------------------------------------------------------------------------- rest
+
+void RestWatch::begin(Stand& stand) {
+  samples_.clear();
+  kinetic_at_start_ = stand.sim.measure(false).kinetic_energy;
+}
+
+std::optional<std::string> RestWatch::done(Stand& stand, const Look& look) {
+  const Until& until = stand.spec.until;
+  const Measures& m = look.m;
+  const bool gravity = stand.c.gravity > 0.0, bottom = stand.sim.plane(plate_bottom).present;
+  // Without gravity there is no potential energy to compare with, without a bottom no support.
+  const double scale = gravity ? m.potential_energy : kinetic_at_start_;
+  bool quiet = m.kinetic_energy <= until.kinetic_to_potential * scale;
+  if (gravity && bottom) quiet = quiet && std::fabs(m.support_force - m.weight) <= 0.01 * m.weight;
+  samples_.push_back({m.time, m.coordination_number, quiet});
+  const double begin = m.time - until.window;
+  while (samples_.size() > 1 && samples_[1].time <= begin) samples_.pop_front();
+  if (samples_.front().time > begin) return std::nullopt;
+  double low = samples_.front().coordination_number, high = low, sum = 0.0;
+  for (const Sample& s : samples_) {
+    if (!s.quiet) return std::nullopt;
+    low = std::min(low, s.coordination_number), high = std::max(high, s.coordination_number);
+    sum += s.coordination_number;
+  }
+  if (high - low > until.coordination_change * sum / static_cast<double>(samples_.size())) return std::nullopt;
+  return fmt::format("at rest for {:.3g} s", until.window);
+}
+
+// ------------------------------------------------------------------------------------------------------------- fill
+
+// The spheres are there already (make_simulation); now the rain falls, without a lid.
+void FillStage::begin(Stand& stand) {
+  if (stand.sim.plane(plate_top).present) stand.sim.remove_plane(plate_top);
+}
+
+std::optional<std::string> FillStage::done(Stand& stand, const Look& look) {
+  if (stand.spec.method == FillMethod::grow) return "bed grown to the target porosity";
+  // The last spheres have landed: what still moves is a thousandth of the energy of position, and the bottom carries all.
+  const Measures& m = look.m;
+  if (m.contacts == 0 && stand.sim.particles() > 1) return std::nullopt;
+  if (m.kinetic_energy <= 1e-3 * m.potential_energy && std::fabs(m.support_force - m.weight) <= 0.1 * m.weight)
+    return "all spheres have landed";
+  return std::nullopt;
+}
+
+void FillStage::end(Stand& stand, StageResult&) {
+  if (!stand.c.plates.top) return;
+  PlaneMotion top;
+  top.origin = std::max(stand.c.box.height, stand.sim.measure(false).highest_point + 0.1 * stand.sim.largest_radius());
+  stand.sim.set_plane(plate_top, top);
+}
+
+// ---------------------------------------------------------------------------------------------------------- vibrate
+
+void VibrateStage::begin(Stand& stand) {
+  PlaneMotion bottom;
+  bottom.origin = stand.sim.plane_position(plate_bottom);
+  bottom.amplitude = stand.spec.amplitude, bottom.frequency = stand.spec.frequency;
+  // Whole cycles: the plate comes back to where it was and rests there for what is left of the stage.
+  bottom.vibration_end = std::floor(stand.spec.frequency * *stand.spec.duration * (1.0 + 1e-12)) / stand.spec.frequency;
+  stand.sim.set_plane(plate_bottom, bottom);
+}
+
+std::optional<std::int64_t> VibrateStage::last_step(const Stand& stand) const { return stand.step_at(*stand.spec.duration); }
+
+void VibrateStage::end(Stand& stand, StageResult&) {
+  PlaneMotion bottom;
+  bottom.origin = stand.sim.plane(plate_bottom).origin;
+  stand.sim.set_plane(plate_bottom, bottom);
+}
+
+std::optional<std::int64_t> RunStage::last_step(const Stand& stand) const { return stand.step_at(*stand.spec.duration); }
+
+}  // namespace platen
