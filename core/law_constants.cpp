@@ -40,6 +40,7 @@ PlateConstants plate_constants(const PlateLaw& law) {
   p.stiffness_t = 8.0 * G_star;
   p.damping = 4.0 * (5.0 / 6.0) * damping_share(law.restitution);
   p.mu = law.friction, p.mu_r = law.rolling_friction;
+  p.normal_to_tangential = std::sqrt(p.stiffness_n / p.stiffness_t);
   p.slip_ratio = p.mu * p.hertz / p.stiffness_t;
   return p;
 }

@@ -245,9 +245,11 @@ void Simulation::integrate(Batch& b, const MotionConstants& c) {
                           column(p.inverse_radius), p.rows.data() + row_size * first, p.image.data() + 2 * first,
                           b.sum_i.data(), b.sum_j.data(), b.count};
   MotionTotals totals;
+  // The places that fill up the last vector rest where they are, but pass for spheres that move with the others.
+  const auto filled = static_cast<std::size_t>(std::max(b.first, p.count)), end = first + static_cast<std::size_t>(b.count);
+  for (auto k = filled; k < end; ++k) p.vx[k] = c.mean_x, p.vy[k] = c.mean_y, p.vz[k] = c.mean_z;
   kernels_.motion(batch, c, totals);
-  // The places that fill up the last vector rest where they are.
-  for (auto k = static_cast<std::size_t>(p.count); k < first + static_cast<std::size_t>(b.count); ++k) {
+  for (auto k = filled; k < end; ++k) {
     for (auto* a : {&p.x, &p.y, &p.z, &p.vx, &p.vy, &p.vz, &p.ux, &p.uy, &p.uz}) (*a)[k] = 0.0;
     p.image[2 * k] = p.image[2 * k + 1] = 0;
   }
@@ -339,6 +341,7 @@ void Simulation::prepare_graph() {
   if (table_) return;
   graph_.reset();
   table_ = std::make_unique<TaskTable>(batches_, unroll_, engine_.fused);
+  if (engine_.tamper) engine_.tamper(*table_);
   if (engine_.executor == Executor::flow_graph)
     workers_->arena.execute([&] { graph_ = std::make_unique<FlowGraph>(*table_, [this](const Task& task) { run_task(task); }); });
 }

@@ -99,8 +99,7 @@ PLATEN_INLINE PairForces<I> pair_forces(const Pairs<I>& p, const PairBatch& b, c
   const Vec3<I> T_old = {I::load(b.tx + k), I::load(b.ty + k), I::load(b.tz + k)};
   const Real limit = I::set(c.mu) * I::abs(normal.height);
   const TangentialResponse<I> tangential = tangential_response<I, exact>(T_old, p.n, p.v_t, k_t, limit, c.dt);
-  const Real beta_t_now = I::where(tangential.cut, zero, beta_t);
-  const Vec3<I> F_t = add_scaled<I>(tangential.spring, -beta_t_now, p.v_t);
+  const Vec3<I> F_t = add_scaled<I>(tangential.spring, I::where(tangential.cut, zero, -beta_t), p.v_t);
 
   const Vec3<I> none = {zero, zero, zero};
   const Vec3<I> T_new = where<I>(out.touching, tangential.spring, none);
@@ -131,14 +130,20 @@ PLATEN_INLINE PairForces<I> pair_forces(const Pairs<I>& p, const PairBatch& b, c
   }
 
   if constexpr (scene.energy) {
-    const Real dt = I::set(c.dt);
-    const Real power = I::fma(beta_n * p.v_n, p.v_n, beta_t_now * dot(p.v_t, p.v_t));
-    energy[term_viscous] = I::where(out.touching, power * dt, zero);
+    // A dashpot's work in a step is c v(n-1/2) v(n) dt; v(n) is not known yet. Summed by parts that is, to second
+    // order, v(n-1/2)^2 (3/4 c(n) + 1/4 c(n-1)) dt: also in the step in which the spheres part [docs/laws.md, "Energy"].
+    const Real old2 = dot(T_old, T_old);
+    const auto was_touching = I::fma(p.v_n, I::set(c.dt), p.delta) > zero;
+    const auto sticking = I::negate(tangential.cut);
+    const Real now = I::set(0.75 * c.dt), before = I::set(0.25 * c.dt);
+    const Real normal_share = I::where(out.touching, now, zero) + I::where(was_touching, before, zero);
+    const Real tangential_share = I::where(sticking, normal_share, zero);
+    const Real viscous = (beta_n * normal_share) * (p.v_n * p.v_n) + (beta_t * tangential_share) * dot(p.v_t, p.v_t);
+    energy[term_viscous] = I::where(I::either(out.touching, was_touching), viscous, zero);
     if constexpr (scene.plasticity)
       energy[term_plastic] = plastic_dissipation<I, scene.exponent>(sp_old, normal.sp, c);
-    const Real old2 = dot(T_old, T_old);
     if constexpr (scene.exponent == Exponent::one) {
-      const Real slid = I::where(out.touching, tangential.before - tangential.after, old2);
+      const Real slid = I::where(out.touching, tangential.loss, old2);
       energy[term_sliding] = slid * I::set(c.half_over_k_t);
     } else {
       // The spring's energy |T|^2/(2 k_t) also changes with k_t(delta): that part is no work of any force [A17].
@@ -146,7 +151,7 @@ PLATEN_INLINE PairForces<I> pair_forces(const Pairs<I>& p, const PairBatch& b, c
       const Real flexible_last = I::where(k_t_last > zero, half / k_t_last, zero);
       const Real flexible = I::where(out.touching, half / k_t, zero);
       energy[term_sliding] =
-          I::where(out.touching, (tangential.before - tangential.after) * flexible, old2 * flexible_last);
+          I::where(out.touching, tangential.loss * flexible, old2 * flexible_last);
       energy[term_model] = I::where(out.touching, old2 * (flexible - flexible_last), zero);
       I::store(b.k_t_last + k, I::where(out.touching, k_t, zero));
     }

@@ -74,7 +74,7 @@ template <class I>
 struct TangentialResponse {
   Vec3<I> spring;                   // T after the step [N]
   typename I::Mask cut;             // the limit holds: sliding
-  typename I::Real before, after;   // |T|^2 before and after the limit [N2]
+  typename I::Real loss;            // 2 k_t times the energy that sliding takes [N2]
 };
 
 // Turns the stored spring into the tangent plane of normal n keeping its length, advances it by -k_t v_t dt, and cuts it
@@ -93,7 +93,10 @@ PLATEN_INLINE TangentialResponse<I> tangential_response(const Vec3<I>& T_old, co
   const Real trial2 = dot(trial, trial), limit2 = limit * limit;
   const auto cut = trial2 >= limit2;  // also where both are 0: no dashpot on a frictionless contact
   const Real back = I::where(cut, limit * inverse_sqrt<I, exact>(I::max(trial2, tiny)), I::set(1.0));
-  return {scale<I>(back, trial), cut, trial2, I::where(cut, limit2, trial2)};
+  // Work of the mean of the old and the new spring over the slip that did not stretch it: (T_old + T)(T_trial - T).
+  const Real over = I::set(1.0) - back;
+  const Real loss = I::where(cut, over * I::fma(back, trial2, stretch * dot(flat, trial)), I::set(0.0));
+  return {scale<I>(back, trial), cut, loss};
 }
 
 // Energy that plastic flow takes when s_p goes from `sp_old` to `sp`: a function of s_p alone, hence exact for any step

@@ -17,8 +17,8 @@ struct PlateResponse {
   Vec3<I> tangential_force;        // F_t [N]
   Vec3<I> xi;                      // elongation after the step [m]
   typename I::Real stiffness_t;    // S_t [N/m]
-  typename I::Real viscous_power;  // c_n v_n^2 + c_t v_t^2 [W]
-  typename I::Real xi2_before, xi2_after;  // |xi|^2 before and after the limit [m2]
+  typename I::Real c_n, c_t;       // dashpots [N s/m]; c_t is 0 while cut
+  typename I::Real slip_old, slip_new;  // (xi_old, xi_new) . slip of the sliding surface [m2]
 };
 
 // delta >= 0; v_n > 0 where sphere and plane part; v_t tangential velocity of the sphere's surface against the plane.
@@ -42,8 +42,8 @@ PLATEN_INLINE PlateResponse<I> plate_response(typename I::Real delta, typename I
   const Vec3<I> xi = scale<I>(back, trial);
   const Real c_t_now = I::where(cut, I::set(0.0), c_t);
   const Vec3<I> F_t = add_scaled<I>(scale<I>(-S_t, xi), -c_t_now, v_t);
-  const Real power = I::fma(c_n * v_n, v_n, c_t_now * dot(v_t, v_t));
-  return {F_s, F_s - c_n * v_n, F_t, xi, S_t, power, trial2, I::where(cut, longest2, trial2)};
+  const Real over = I::where(cut, I::set(1.0) - back, I::set(0.0));
+  return {F_s, F_s - c_n * v_n, F_t, xi, S_t, c_n, c_t_now, over * dot(xi_old, trial), over * (back * trial2)};
 }
 
 }  // namespace platen

@@ -58,10 +58,17 @@ void plate_kernel(const PlateBatch& b, const Plane& plane, const PlateConstants&
       I::store_record(b.records + record_size * static_cast<std::int64_t>(k + lane), records[lane]);
 
     const Real half = I::set(0.5), old2 = dot(xi_old, xi_old);
-    const Real viscous = I::where(touching, r.viscous_power * dt, zero);
-    const Real sliding =
-        I::where(touching, half * r.stiffness_t * (r.xi2_before - r.xi2_after), half * S_last * old2);
-    const Real model = I::where(touching, half * old2 * (r.stiffness_t - S_last), zero);
+    // As in contact_kernel.h: v(n-1/2)^2 (3/4 c(n) + 1/4 c(n-1)) dt, c^2 = damping m S.
+    const Real c_t_last = I::sqrt((I::set(c.damping) * m) * S_last);
+    const Real c_n_last = c_t_last * I::set(c.normal_to_tangential);
+    const Real now = I::set(0.75 * c.dt), before = I::set(0.25 * c.dt);
+    const Real c_n = I::where(touching, r.c_n * now, zero) + c_n_last * before;
+    const Real c_t = I::where(touching, r.c_t * now, zero) + I::where(r.c_t > zero, c_t_last, zero) * before;
+    const Real viscous = I::where(I::either(touching, S_last > zero), c_n * (v_n * v_n) + c_t * dot(v_t, v_t), zero);
+    // Work of the mean of the old and the new spring force over the slip; and what the change of S_t does to the stored
+    // energy beyond the work of that mean force, which is no work of anything [A17].
+    const Real sliding = I::where(touching, half * I::fma(S_last, r.slip_old, r.stiffness_t * r.slip_new), half * S_last * old2);
+    const Real model = I::where(touching, half * dot(xi_old, xi) * (r.stiffness_t - S_last), zero);
     const Real on_axis[3] = {F.x, F.y, F.z};
     const Real work = on_axis[plane.axis] * I::set(plane.velocity) * dt;
     totals.energy[term_viscous] += energy_units(viscous);

@@ -92,6 +92,7 @@ struct PlateConstants {
   double stiffness_n;      // 2 E*
   double stiffness_t;      // 8 G*
   double damping;          // 4 * 5/6 * z: c^2 = damping m S
+  double normal_to_tangential;  // sqrt(S_n/S_t), the ratio of the dashpots
   double mu, mu_r;
   double slip_ratio;       // mu (4/3 E*)/(8 G*): largest elongation = slip_ratio delta
   Quantum force, energy;

@@ -3,6 +3,8 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstring>
+#include <stdexcept>
 #include <vector>
 
 #include "core/simulation.h"
@@ -64,6 +66,45 @@ inline SimulationSetup bed(const BedOptions& o, const PairLaw& law, const Engine
       }
   return setup;
 }
+
+// Laws that need what a built scene offers, with every branch in use by spheres that collide at some 0.1 m/s.
+struct LawCase {
+  const char* name;
+  PairLaw law;
+  double spread;  // of radii, BedOptions::spread
+  int scene;      // that was made for it, a number of built_scenes
+};
+
+inline int scene_number(const char* name) {
+  for (std::size_t k = 0; k < built_scenes.size(); ++k)
+    if (std::strcmp(built_scenes[k].name, name) == 0) return static_cast<int>(k);
+  throw std::invalid_argument(name);
+}
+
+inline std::vector<LawCase> laws_of_scenes() {
+  const PairLaw full = full_law();
+  PairLaw elastic = full;
+  elastic.k2 = elastic.k1, elastic.k_adh = elastic.f0 = elastic.rolling_friction = 0.0;
+  PairLaw cohesionless = full;
+  cohesionless.k_adh = cohesionless.f0 = 0.0;
+  PairLaw hertzian = full;
+  hertzian.exponent = 1.5, hertzian.k1 = 5e5, hertzian.k2 = 2e6, hertzian.k_adh = 2e5;
+  PairLaw soft = full;
+  soft.exponent = 0.8, soft.k1 = 1e3, soft.k2 = 4e3, soft.k_adh = 500;
+  PairLaw square = full;
+  square.exponent = 2.0, square.k1 = 5e7, square.k2 = 2e8, square.k_adh = 2e7;
+  square.rolling_model = RollingModel::relative, square.rolling_friction = 0.05;
+  return {{"elastic", elastic, 0.0, scene_number("elastic")},
+          {"cohesionless", cohesionless, 0.0, scene_number("cohesionless")},
+          {"full", full, 0.0, scene_number("full")},
+          {"full, unequal", full, 0.4, scene_number("full_wide")},
+          {"n = 3/2", hertzian, 0.4, scene_number("three_halves")},
+          {"n = 0.8", soft, 0.4, scene_number("any_exponent")},
+          {"n = 2, relative rolling", square, 0.4, scene_number("relative_rolling")}};
+}
+
+// Top of the grid of a bed.
+inline double height_of(const BedOptions& o) { return o.nz * o.spacing * o.R; }
 
 inline void add_plates(Simulation& sim, double z_top, double top_velocity) {
   PlaneMotion bottom, top;

@@ -1,0 +1,223 @@
+// The program `platen`: command line in, exit code out. What the commands do is in *_command.cpp.
+#include <CLI/CLI.hpp>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <cstdio>
+#include <exception>
+#include <new>
+
+#include "core/simulation.h"
+#include "kernels/kernel_table.h"
+#include "protocol/check_command.h"
+#include "protocol/experiment.h"
+#include "protocol/info.h"
+#include "protocol/law_command.h"
+#include "protocol/output/output_error.h"
+#include "protocol/progress.h"
+#include "protocol/run_command.h"
+#include "protocol/units.h"
+#include "protocol/usage_error.h"
+
+namespace platen {
+namespace {
+
+constexpr int exit_internal = 1;  // a mistake of ours, or no memory
+constexpr int most_threads = 4096;
+
+void set_up_log() {
+  auto sink = std::make_shared<spdlog::sinks::stderr_color_sink_st>(
+      may_colour(stderr) ? spdlog::color_mode::always : spdlog::color_mode::never);
+  auto log = std::make_shared<spdlog::logger>("platen", sink);
+  log->set_pattern("%v");
+  spdlog::set_default_logger(log);
+}
+
+struct Command {
+  CLI::App* app = nullptr;
+  const char* example = "";
+  std::function<int()> carry_out;
+};
+
+CLI::Option* add_case(CLI::App& app, std::filesystem::path& file) {
+  return app.add_option("CASE", file, "the case file (TOML)")->required();
+}
+
+void add_overrides(CLI::App& app, std::vector<std::string>& overrides) {
+  app.add_option("--set", overrides, "change one key of the case; stages by name or number. May be repeated")
+      ->type_name("KEY.PATH=VALUE")
+      ->take_all()
+      ->allow_extra_args(false);
+}
+
+void add_threads(CLI::App& app, std::optional<int>& threads) {
+  app.add_option("--threads", threads, "threads (default: the cores that this process may use)")
+      ->type_name("N")
+      ->check(CLI::Range(1, most_threads));
+}
+
+// Lengths and times of options, with the message of the unit reader.
+double option_value(const char* option, const std::string& text, Quantity quantity) {
+  try {
+    return to_si(text, quantity);
+  } catch (const UnitError& error) {
+    throw UsageError(std::string(option) + ": " + error.what());
+  }
+}
+
+Command add_run(CLI::App& program) {
+  CLI::App* app = program.add_subcommand("run", "run a case into a folder");
+  auto command = std::make_shared<RunCommand>();
+  auto walltime = std::make_shared<std::string>();
+  add_case(*app, command->case_file);
+  app->add_option("-o,--output", command->folder, "run folder (default: runs/<name of the case>, with the next free number)")
+      ->type_name("DIR");
+  add_threads(*app, command->threads);
+  add_overrides(*app, command->overrides);
+  app->add_option("--max-walltime", *walltime, "stop after this time, e.g. \"90 s\", \"10 min\", \"2 h\"")->type_name("T");
+  app->add_option("--stop-after", command->stop_after, "end after this stage, by name or number")->type_name("STAGE");
+  app->add_flag("--reproducible", command->reproducible, "the same bits on every instruction set; somewhat slower");
+  app->add_flag("--force", command->force, "replace the run that is in the folder");
+  app->add_flag("--json", command->json, "print the summary as JSON");
+  app->add_flag("-q,--quiet", command->quiet, "print nothing but errors");
+  return {app, "platen run protocol/cases/quick.toml -o runs/first --set stage.compress.speed='\"20 mm/s\"'", [=] {
+            preferred_instruction_set();
+            if (!walltime->empty()) command->max_walltime = parse_walltime(*walltime);
+            return run_command(*command);
+          }};
+}
+
+Command add_check(CLI::App& program) {
+  CLI::App* app = program.add_subcommand("check", "say whether a case is right, and what follows from it");
+  auto command = std::make_shared<CheckCommand>();
+  add_case(*app, command->case_file);
+  add_overrides(*app, command->overrides);
+  add_threads(*app, command->threads);
+  app->add_flag("--json", command->json, "print JSON");
+  return {app, "platen check protocol/cases/cohesive.toml", [=] { return check_command(*command); }};
+}
+
+Command add_law(CLI::App& program) {
+  CLI::App* app = program.add_subcommand("law", "drive one contact along overlaps and print its force as CSV");
+  auto command = std::make_shared<LawCommand>();
+  auto contact = std::make_shared<std::string>("pair");
+  auto radius = std::make_shared<std::string>();
+  auto cycle = std::make_shared<bool>(false);
+  add_case(*app, command->case_file);
+  add_overrides(*app, command->overrides);
+  auto* path = app->add_option_group("path", "one of them");
+  path->add_option("--overlap", command->overlap_file, "overlaps, one a line, in metres or with a unit; - reads standard input")
+      ->type_name("FILE");
+  path->add_flag("--cycle", *cycle, "loading, unloading, re-loading, adhesion, separation");
+  path->require_option(1);
+  app->add_option("--contact", *contact, "between two spheres, or a sphere and a plate")
+      ->type_name("pair|plate")
+      ->check(CLI::IsMember({"pair", "plate"}));
+  app->add_option("--radius", *radius, "of the sphere (default: the case's; of a distribution the largest)")->type_name("LENGTH");
+  app->add_option("-o,--output", command->output, "write the CSV there")->type_name("CSV");
+  return {app, "platen law protocol/cases/load-dependent.toml --cycle -o law.csv", [=] {
+            if (!*cycle && command->overlap_file.empty()) throw UsageError("--overlap: the name of a file is missing");
+            command->plate = *contact == "plate";
+            if (!radius->empty()) {
+              command->radius = option_value("--radius", *radius, Quantity::length);
+              if (!(*command->radius > 0.0)) throw UsageError("--radius: " + *radius + " is not a positive length");
+            }
+            return law_command(*command);
+          }};
+}
+
+Command add_info(CLI::App& program) {
+  CLI::App* app = program.add_subcommand("info", "say what is in a run folder, an HDF5 file or a case file");
+  auto path = std::make_shared<std::filesystem::path>();
+  auto json = std::make_shared<bool>(false);
+  app->add_option("PATH", *path, "run folder, HDF5 file or case file")->required();
+  app->add_flag("--json", *json, "print JSON");
+  return {app, "platen info runs/quick", [=] {
+            const std::string text = describe(*path, *json);
+            std::fwrite(text.data(), 1, text.size(), stdout);
+            return static_cast<int>(exit_done);
+          }};
+}
+
+// A command without any argument: how it is used, rather than the first thing that is missing.
+int explain(const CLI::App& app, const char* example) {
+  std::fprintf(stderr, "%sExample:\n  %s\n", app.help().c_str(), example);
+  return exit_usage;
+}
+
+int usage_error(const std::string& message, const std::string& command) {
+  spdlog::error("platen: {}\nplaten {}--help says what there is", message, command);
+  return exit_usage;
+}
+
+int run_program(int argc, char** argv) {
+  CLI::App program("Discrete element simulation of the uniaxial test of powders: fill, compress, unload, crush.", "platen");
+  program.set_version_flag("--version", PLATEN_VERSION, "print the version");
+  program.set_help_flag("-h,--help", "print this help");
+  program.require_subcommand(1);
+  program.footer("platen COMMAND --help explains a command.");
+  const std::vector<Command> commands = {add_run(program), add_check(program), add_law(program), add_info(program)};
+  for (const Command& command : commands) command.app->footer(std::string("Example:\n  ") + command.example);
+
+  if (argc == 1) {
+    std::fputs(program.help().c_str(), stderr);
+    return exit_usage;
+  }
+  for (const Command& command : commands)
+    if (argc == 2 && command.app->get_name() == argv[1]) {
+      std::fputs(command.app->help().c_str(), stderr);
+      return exit_usage;
+    }
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::Success& asked) {  // --help, --version
+    return program.exit(asked);
+  } catch (const CLI::ParseError& error) {
+    const auto chosen = program.get_subcommands();
+    return usage_error(error.what(), chosen.empty() ? "" : chosen.front()->get_name() + " ");
+  }
+  for (const Command& command : commands)
+    if (command.app->parsed()) {
+      try {
+        return command.carry_out();
+      } catch (const UsageError& error) {
+        return usage_error(error.what(), command.app->get_name() + " ");
+      }
+    }
+  return exit_usage;
+}
+
+// The promise of the exit codes; a message names file and line itself where there is one.
+int guarded(int argc, char** argv) {
+  try {
+    const int code = run_program(argc, argv);
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) throw OutputError("standard output: cannot write");
+    return code;
+  } catch (const CaseError& error) {
+    spdlog::error("{}", error.what());
+    return exit_case;
+  } catch (const RunError& error) {
+    spdlog::error("{}", error.what());
+    return exit_numerical;
+  } catch (const OutputError& error) {
+    spdlog::error("{}", error.what());
+    return exit_io;
+  } catch (const std::filesystem::filesystem_error& error) {
+    spdlog::error("{}", error.what());
+    return exit_io;
+  } catch (const std::bad_alloc&) {
+    spdlog::error("there is not enough memory for this case");
+    return exit_internal;
+  } catch (const std::exception& error) {
+    spdlog::error("internal error: {}", error.what());
+    return exit_internal;
+  }
+}
+
+}  // namespace
+}  // namespace platen
+
+int main(int argc, char** argv) {
+  platen::set_up_log();
+  return platen::guarded(argc, argv);
+}

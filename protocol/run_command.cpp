@@ -1,0 +1,109 @@
+#include "protocol/run_command.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+
+#include "kernels/kernel_table.h"
+#include "protocol/experiment.h"
+#include "protocol/output.h"
+#include "protocol/progress.h"
+#include "protocol/stop_signals.h"
+#include "protocol/units.h"
+#include "protocol/usable_cores.h"
+#include "protocol/usage_error.h"
+
+namespace platen {
+namespace {
+
+namespace fs = std::filesystem;
+
+void print(const std::string& text) { std::fwrite(text.data(), 1, text.size(), stdout); }
+
+// What the user should know beside the table: why the run did not simply end.
+void report_end(const RunOutcome& outcome, const fs::path& folder, bool quiet) {
+  switch (outcome.exit_code) {
+    case exit_done: break;
+    case exit_stopped:
+      if (!quiet) spdlog::warn("{}; what there is so far: {}", outcome.message, folder.string());
+      break;
+    default: spdlog::error("{}; what there is so far: {}", outcome.message, folder.string());
+  }
+}
+
+}  // namespace
+
+double parse_walltime(const std::string& text) {
+  double seconds = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seconds);
+  try {
+    if (error != std::errc{} || end != text.data() + text.size()) seconds = to_si(text, Quantity::time);
+  } catch (const UnitError& problem) {
+    throw UsageError(fmt::format("--max-walltime: {}; allowed: \"90 s\", \"10 min\", \"2 h\" or plain seconds", problem.what()));
+  }
+  if (!(seconds > 0.0) || !std::isfinite(seconds))
+    throw UsageError(fmt::format("--max-walltime: {} is not a positive time", text));
+  return seconds;
+}
+
+fs::path free_run_folder(const fs::path& case_file) {
+  const std::string stem = case_file.stem().empty() ? "run" : case_file.stem().string();
+  fs::path folder = fs::path("runs") / stem;
+  std::error_code ignored;
+  for (int k = 2; fs::exists(fs::symlink_status(folder, ignored)); ++k)
+    folder = fs::path("runs") / fmt::format("{}-{}", stem, k);
+  return folder;
+}
+
+std::string stage_named(const Case& c, const std::string& text) {
+  std::string names;
+  for (const StageSpec& stage : c.stages) {
+    if (stage.name == text) return text;
+    names += (names.empty() ? "" : ", ") + stage.name;
+  }
+  std::size_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error == std::errc{} && end == text.data() + text.size() && number >= 1 && number <= c.stages.size())
+    return c.stages[number - 1].name;
+  throw UsageError(fmt::format("--stop-after: the case has no stage \"{}\"; allowed: {}", text, names));
+}
+
+int run_command(const RunCommand& command) {
+  // Everything that can be wrong with the request is found before the folder is touched.
+  const Case c = read_case(command.case_file, command.overrides);
+  refuse_unstable_step(c);
+  RunOptions options;
+  options.threads = command.threads.value_or(usable_cores());
+  options.reproducible = command.reproducible;
+  options.max_walltime = command.max_walltime;
+  if (!command.stop_after.empty()) options.stop_after = stage_named(c, command.stop_after);
+
+  const fs::path path = command.folder.empty() ? free_run_folder(command.case_file) : command.folder;
+  options.stop_signal = &catch_stop_signals(command.quiet);
+  RunFolder folder = RunFolder::create(path, c.text, command.force);
+
+  std::vector<std::string> names;
+  for (const StageSpec& stage : c.stages) names.push_back(stage.name);
+  ProgressPrinter printer(stderr, progress_style(stderr, command.quiet), names);
+  options.progress = [&](const Progress& progress) { printer.update(progress); };
+  options.stage_closed = [&](const StageResult& stage) { printer.stage_closed(stage); };
+  if (!command.quiet)
+    spdlog::info("{}: {} spheres, {} stages, {} thread{}, into {}", command.case_file.filename().string(), c.particles.count,
+                 c.stages.size(), options.threads, options.threads == 1 ? "" : "s", path.string());
+
+  const RunOutcome outcome = run_experiment(c, folder, options);
+  printer.clear();
+  if (command.json) {
+    print(read_whole_file(path / "summary.json"));
+  } else if (!command.quiet) {
+    print(summary_table(outcome.stages));
+    print(fmt::format("results: {} (results.h5, series.csv, summary.json)\n", path.string()));
+  }
+  report_end(outcome, path, command.quiet);
+  return outcome.exit_code;
+}
+
+}  // namespace platen

@@ -1,0 +1,38 @@
+// `platen run`: a case from its file to a run folder.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "protocol/case_file.h"
+
+namespace platen {
+
+struct RunCommand {
+  std::filesystem::path case_file;
+  std::filesystem::path folder;         // empty: runs/<stem of the case file>, with the next free number
+  std::vector<std::string> overrides;   // --set
+  std::optional<int> threads;           // default: usable_cores()
+  std::optional<double> max_walltime;   // [s]
+  std::string stop_after;               // stage by name, or by number from 1
+  bool reproducible = false;
+  bool force = false;                   // replace a run that is in the folder
+  bool json = false;                    // the summary as JSON on standard output instead of the table
+  bool quiet = false;                   // nothing but errors
+};
+
+// A duration as users write it: "90 s", "10 min", "2 h" or plain seconds, > 0. Throws UsageError.
+double parse_walltime(const std::string& text);
+
+// runs/<stem>, or with -2, -3 ... where that is taken.
+std::filesystem::path free_run_folder(const std::filesystem::path& case_file);
+
+// The name of the stage that `text` means; throws UsageError naming all stages.
+std::string stage_named(const Case& c, const std::string& text);
+
+// Returns the exit code. Throws UsageError and CaseError before anything is written, OutputError.
+int run_command(const RunCommand& command);
+
+}  // namespace platen

@@ -1,0 +1,213 @@
+// Every function of kernels/real.h against plain doubles, for one instruction set.
+//
+// Included by one file per instruction set, compiled with its flags. Everything here has internal linkage and no test
+// framework is included, so that such a file leaves no symbol that another one could be linked to.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+
+#include "kernels/real.h"
+
+namespace platen {
+
+// Hears of every comparison that fails.
+struct RealReport {
+  void (*fail)(void* context, const char* what, double got, double wanted);
+  void* context;
+  long compared = 0;
+};
+
+void check_real_scalar(RealReport& report);
+void check_real_avx2(RealReport& report);
+void check_real_avx512(RealReport& report);
+
+namespace {
+
+// Signs of zeros, infinities, not a number, ties of rounding, numbers far apart. A prime number of them, so that every
+// one comes to stand in every lane.
+constexpr int value_count = 23;
+const double values[value_count] = {
+    0.0, -0.0, 1.0, -1.0, 0.5, -0.5, 1.5, 2.5, -2.5, 3.7, -1e-300, 1e300, -1e300, 1e-160, 0x1p50, -0x1p50 - 1.0,
+    std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(),
+    std::numeric_limits<double>::quiet_NaN(), 0.1, 1.0 / 3.0, -7.25, 0x1.fffffffffffffp-1};
+
+inline std::uint64_t bits_of(double x) {
+  std::uint64_t bits;
+  std::memcpy(&bits, &x, sizeof bits);
+  return bits;
+}
+
+template <class I>
+class RealChecks {
+  using Real = typename I::Real;
+  static constexpr int W = I::width;
+  RealReport& report_;
+
+  // The same bits, or both not a number.
+  void same(const char* what, double got, double wanted) {
+    ++report_.compared;
+    if (bits_of(got) == bits_of(wanted) || (std::isnan(got) && std::isnan(wanted))) return;
+    report_.fail(report_.context, what, got, wanted);
+  }
+  void equal(const char* what, double got, double wanted) {  // zeros of either sign are one
+    ++report_.compared;
+    if (!(got == wanted)) report_.fail(report_.context, what, got, wanted);
+  }
+  static Real lanes_from(int start, int stride) {
+    double v[W];
+    for (int lane = 0; lane < W; ++lane) v[lane] = values[(start + stride * lane) % value_count];
+    return I::load(v);
+  }
+  static double at(int start, int stride, int lane) { return values[(start + stride * lane) % value_count]; }
+  template <class Want>
+  void each(const char* what, Real got, const Want& want) {
+    double v[W];
+    I::store(v, got);
+    for (int lane = 0; lane < W; ++lane) same(what, v[lane], want(lane));
+  }
+
+  void arithmetic() {
+    for (int p = 0; p < value_count; ++p)
+      for (int q = 0; q < value_count; ++q) {
+        const Real a = lanes_from(p, 1), b = lanes_from(q, 1), c = lanes_from(p + 2 * q, 3);
+        const auto A = [&](int l) { return at(p, 1, l); };
+        const auto B = [&](int l) { return at(q, 1, l); };
+        const auto C = [&](int l) { return at(p + 2 * q, 3, l); };
+        each("+", a + b, [&](int l) { return A(l) + B(l); });
+        each("-", a - b, [&](int l) { return A(l) - B(l); });
+        each("*", a * b, [&](int l) { return A(l) * B(l); });
+        each("/", a / b, [&](int l) { return A(l) / B(l); });
+        each("negation", -a, [&](int l) { return -A(l); });
+        each("fma", I::fma(a, b, c), [&](int l) { return std::fma(A(l), B(l), C(l)); });
+        each("min", I::min(a, b), [&](int l) { return A(l) < B(l) ? A(l) : B(l); });
+        each("max", I::max(a, b), [&](int l) { return A(l) > B(l) ? A(l) : B(l); });
+        each("where <", I::where(a < b, a, c), [&](int l) { return A(l) < B(l) ? A(l) : C(l); });
+        each("where >", I::where(a > b, a, c), [&](int l) { return A(l) > B(l) ? A(l) : C(l); });
+        each("where >=", I::where(a >= b, a, c), [&](int l) { return A(l) >= B(l) ? A(l) : C(l); });
+        each("both", I::where(I::both(a < b, b < c), a, c), [&](int l) { return A(l) < B(l) && B(l) < C(l) ? A(l) : C(l); });
+        each("either", I::where(I::either(a < b, b < c), a, c), [&](int l) { return A(l) < B(l) || B(l) < C(l) ? A(l) : C(l); });
+        each("negate", I::where(I::negate(a < b), a, c), [&](int l) { return A(l) < B(l) ? C(l) : A(l); });
+        int count = 0;
+        for (int l = 0; l < W; ++l) count += A(l) < B(l) ? 1 : 0;
+        equal("count", I::count(a < b), count);
+        equal("any", I::any(a < b) ? 1.0 : 0.0, count > 0 ? 1.0 : 0.0);
+        equal("any of negated", I::any(I::negate(a < b)) ? 1.0 : 0.0, count < W ? 1.0 : 0.0);
+        equal("count of negated", I::count(I::negate(a < b)), W - count);
+      }
+  }
+
+  void one_argument() {
+    for (int p = 0; p < value_count; ++p) {
+      const Real a = lanes_from(p, 1);
+      const auto A = [&](int l) { return at(p, 1, l); };
+      each("load and store", a, A);
+      each("set", I::set(values[p]), [&](int) { return values[p]; });
+      each("abs", I::abs(a), [&](int l) { return std::fabs(A(l)); });
+      each("sqrt", I::sqrt(a), [&](int l) { return std::sqrt(A(l)); });
+      each("exact inverse sqrt", inverse_sqrt<I, true>(a), [&](int l) { return 1.0 / std::sqrt(A(l)); });
+    }
+    // round: nearest, ties to even, odd; zeros may have either sign.
+    for (int k = -4096; k <= 4096; ++k) {
+      const double x = k / 16.0 + (k % 7) * 0x1p48;
+      double up[W], down[W];
+      I::store(up, I::round(I::set(x))), I::store(down, I::round(I::set(-x)));
+      for (int lane = 0; lane < W; ++lane) {
+        equal("round", up[lane], std::nearbyint(x));
+        equal("round is odd", down[lane], -up[lane]);
+      }
+    }
+    // Errors below 2 ulp = 4 2^-53 over all exponents that squares of lengths, speeds and forces may have.
+    double worst = 0.0;
+    for (int k = 0; k < 40000; ++k) {
+      double x[W], y[W];
+      for (int lane = 0; lane < W; ++lane) x[lane] = std::ldexp(1.0 + (k * W + lane) * 9.3e-6, (k * 37 + lane) % 1700 - 899);
+      I::store(y, inverse_sqrt<I, false>(I::load(x)));
+      for (int lane = 0; lane < W; ++lane) {
+        const long double exact = 1.0L / std::sqrt(static_cast<long double>(x[lane]));
+        const double error = static_cast<double>((y[lane] - exact) / exact);
+        worst = worst > std::fabs(error) ? worst : std::fabs(error);
+      }
+    }
+    ++report_.compared;
+    if (!(worst < 4.0 * 0x1p-53)) report_.fail(report_.context, "fast inverse sqrt, relative error", worst, 4.0 * 0x1p-53);
+  }
+
+  void across_lanes() {
+    for (int p = 0; p < 64; ++p) {
+      double v[W], sum = 0.0, largest = -1e9;
+      for (int lane = 0; lane < W; ++lane) {
+        v[lane] = (p * 13 + lane * 29) % 101 - 50;  // whole numbers: exact in any order
+        sum += v[lane];
+        largest = v[lane] > largest ? v[lane] : largest;
+      }
+      equal("sum", I::sum(I::load(v)), sum);
+      equal("largest", I::largest(I::load(v)), largest);
+    }
+  }
+
+  void rows_and_records() {
+    constexpr int rows = 19;
+    alignas(64) double row[12 * rows];
+    for (int k = 0; k < 12 * rows; ++k) row[k] = 1000.0 + k;
+    for (int start = 0; start < rows; ++start)
+      for (const int first : {0, 4, 8}) {
+        std::int32_t index[W];
+        for (int lane = 0; lane < W; ++lane) index[lane] = (start + 7 * lane * lane) % rows;
+        Real fields[4];
+        I::fetch4(row, index, first, fields);
+        for (int k = 0; k < 4; ++k)
+          each("fetch4", fields[k], [&](int lane) { return 1000.0 + 12 * index[lane] + first + k; });
+
+        alignas(64) double out[12 * W];
+        for (double& x : out) x = -1.0;
+        I::scatter4(out, first, fields);
+        for (int lane = 0; lane < W; ++lane)
+          for (int k = 0; k < 12; ++k)
+            same("scatter4", out[12 * lane + k], k >= first && k < first + 4 ? 1000.0 + 12 * index[lane] + k : -1.0);
+      }
+
+    Real fields[8], back[8];
+    for (int k = 0; k < 8; ++k) {
+      double v[W];
+      for (int lane = 0; lane < W; ++lane) v[lane] = 10.0 * lane + k + 0.5;
+      fields[k] = I::load(v);
+    }
+    typename I::Record records[W];
+    I::to_records(fields, records);
+    I::from_records(records, back);
+    for (int k = 0; k < 8; ++k) each("from_records", back[k], [&](int lane) { return 10.0 * lane + k + 0.5; });
+    alignas(64) double a[8], b[8];
+    for (int lane = 0; lane < W; ++lane) {
+      I::store_record(a, records[lane]);
+      for (int k = 0; k < 8; ++k) same("to_records", a[k], 10.0 * lane + k + 0.5);
+      I::store_record(b, I::add(records[lane], I::load_record(a)));
+      for (int k = 0; k < 8; ++k) same("add", b[k], a[k] + a[k]);
+      I::store_record(b, I::keep(true, records[lane]));
+      for (int k = 0; k < 8; ++k) same("keep", b[k], a[k]);
+      I::store_record(b, I::keep(false, records[lane]));
+      for (int k = 0; k < 8; ++k) same("keep not", b[k], 0.0);
+      I::store_record(b, I::react(records[lane]));
+      for (int k = 0; k < 8; ++k) same("react", b[k], k < 3 ? -a[k] : a[k]);
+    }
+    I::store_record(b, I::zero_record());
+    for (int k = 0; k < 8; ++k) same("zero_record", b[k], 0.0);
+    for (double& x : a) x = std::numeric_limits<double>::quiet_NaN();
+    I::store_record(b, I::keep(false, I::load_record(a)));  // what is dropped may be anything
+    for (int k = 0; k < 8; ++k) same("keep no NaN", b[k], 0.0);
+  }
+
+ public:
+  explicit RealChecks(RealReport& report) : report_(report) {}
+  void all() {
+    arithmetic();
+    one_argument();
+    across_lanes();
+    rows_and_records();
+  }
+};
+
+}  // namespace
+}  // namespace platen

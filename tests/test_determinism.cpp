@@ -1,0 +1,200 @@
+// The same bits for any number of threads, executor, batch size, list width, graph length, and for any way to look at
+// the run while it goes: state hash and every column of the energy ledger.
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <functional>
+
+#include "tests/scenes.h"
+
+namespace platen {
+namespace {
+
+using scenes::BedOptions;
+
+struct Outcome {
+  std::uint64_t hash = 0;
+  std::vector<double> numbers;  // every measured quantity
+  EngineCounters counters;
+};
+
+std::vector<double> numbers_of(const Measures& m) {
+  const Ledger& l = m.ledger;
+  return {m.time, m.height, m.stress_top, m.stress_bottom, m.porosity, m.coordination_number, static_cast<double>(m.contacts),
+          m.kinetic_energy, m.potential_energy, m.support_force, m.weight, m.energy_residual, m.highest_point,
+          l.elastic_energy, l.adhesion_energy, l.tangential_energy, l.plate_energy, l.plastic_dissipation,
+          l.viscous_dissipation, l.sliding_dissipation, l.rolling_dissipation, l.plate_model_work, l.plate_work};
+}
+
+void expect_same(const Outcome& got, const Outcome& wanted, const std::string& what) {
+  EXPECT_EQ(got.hash, wanted.hash) << what;
+  ASSERT_EQ(got.numbers.size(), wanted.numbers.size());
+  for (std::size_t k = 0; k < wanted.numbers.size(); ++k)
+    EXPECT_EQ(std::memcmp(&got.numbers[k], &wanted.numbers[k], sizeof(double)), 0)
+        << what << ", number " << k << ": " << got.numbers[k] << " against " << wanted.numbers[k];
+}
+
+// A periodic bed of 990 spheres, no multiple of a vector, pressed from above, with a few spheres ten times as fast as
+// the rest.
+SimulationSetup pressed_bed(const EngineOptions& engine) {
+  BedOptions o;
+  o.nx = 11, o.ny = 9, o.nz = 10, o.speed = 0.3;
+  SimulationSetup setup = scenes::bed(o, scenes::full_law(), engine);
+  setup.engine.instruction_set = available_instruction_sets().back();
+  for (std::size_t k = 100; k < setup.spheres.id.size(); k += 211) setup.spheres.velocity[3 * k + k % 3] = 3.0;
+  return setup;
+}
+constexpr int bed_steps = 1500;
+
+using Way = std::function<void(Simulation&, std::int64_t steps)>;
+void straight(Simulation& sim, std::int64_t steps) { sim.advance(steps); }
+
+Outcome run(const SimulationSetup& setup, std::int64_t steps, const Way& way = straight) {
+  Simulation sim(setup);
+  sim.set_time_step(1e-5);
+  scenes::add_plates(sim, 10 * 1.9 * 0.0025 + 5e-5, -0.3);
+  sim.count_inserted();
+  way(sim, steps);
+  return {sim.state_hash(), numbers_of(sim.measure()), sim.counters()};
+}
+
+const Outcome& reference() {
+  static const Outcome outcome = run(pressed_bed({}), bed_steps);
+  return outcome;
+}
+
+TEST(Determinism, TheBedIsLively) {  // what the other tests compare is worth comparing
+  const Outcome& r = reference();
+  EXPECT_GT(r.counters.rebuilds, 1);
+  EXPECT_GT(r.counters.prunes, 10);
+  EXPECT_GT(r.numbers[2], 100.0);  // stress on the top plate [Pa]
+  EXPECT_GT(r.numbers[6], 2000);   // contacts
+}
+
+TEST(Determinism, ThreadsAndExecutors) {
+  for (const int threads : {1, 2, 3, 5, 8, 16})
+    for (const bool fused : {false, true})
+      for (const Executor executor : {Executor::flow_graph, Executor::plain_threads}) {
+        EngineOptions engine;
+        engine.threads = threads, engine.fused = fused, engine.executor = executor, engine.batch = 64;
+        // Plain threads turn round and round while they wait: a few steps are enough for more of them than cores.
+        const bool many = executor == Executor::plain_threads && threads > 3;
+        const std::int64_t steps = many ? 150 : bed_steps;
+        const Outcome wanted = many ? run(pressed_bed({}), steps) : reference();
+        expect_same(run(pressed_bed(engine), steps), wanted,
+                    std::to_string(threads) + (fused ? " fused" : " split") +
+                        (executor == Executor::flow_graph ? " flow graph" : " plain threads"));
+      }
+}
+
+TEST(Determinism, BatchSizes) {
+  for (const int batch : {16, 64, 256})
+    for (const bool fused : {false, true}) {
+      EngineOptions engine;
+      engine.batch = batch, engine.fused = fused;
+      const Outcome r = run(pressed_bed(engine), bed_steps);
+      expect_same(r, reference(), "batch " + std::to_string(batch));
+      EXPECT_NEAR(r.counters.batches, 990.0 / batch, 2.0);
+    }
+}
+
+TEST(Determinism, SkinsAndGaps) {
+  const double R = 0.0025;
+  for (const double skin : {0.1 * R, 0.3 * R, 0.7 * R})
+    for (const double gap : {0.01 * R, 0.05 * R, 0.2 * R}) {
+      EngineOptions engine;
+      engine.skin = skin, engine.inner_gap = gap;
+      expect_same(run(pressed_bed(engine), bed_steps), reference(),
+                  "skin " + std::to_string(skin / R) + " R, gap " + std::to_string(gap / R) + " R");
+    }
+}
+
+TEST(Determinism, GraphLengths) {
+  for (const int unroll : {1, 7, 32})
+    for (const int threads : {1, 2}) {
+      EngineOptions engine;
+      engine.unroll = unroll, engine.threads = threads;
+      expect_same(run(pressed_bed(engine), bed_steps), reference(), "unroll " + std::to_string(unroll));
+    }
+}
+
+TEST(Determinism, LookingChangesNothing) {
+  const Way often = [](Simulation& sim, std::int64_t steps) {
+    for (std::int64_t k = 0; k < steps; ++k) {
+      sim.advance(1);
+      switch (k % 5) {
+        case 0: sim.measure(); break;
+        case 1: sim.snapshot(k % 2 == 0); break;
+        case 2: sim.state_hash("a stage"); break;
+        case 3: sim.stress(plate_top); break;
+        default: break;
+      }
+      if (k % 250 == 0) sim.step_limits();
+    }
+  };
+  for (const int threads : {1, 2}) {
+    EngineOptions engine;
+    engine.threads = threads;
+    expect_same(run(pressed_bed(engine), bed_steps, often), reference(), "often");
+  }
+}
+
+TEST(Determinism, RebuildsAtAnyTime) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    const Way rebuilding = [seed](Simulation& sim, std::int64_t steps) {
+      scenes::Sequence random(seed);
+      for (std::int64_t done = 0; done < steps;) {
+        const auto n = std::min<std::int64_t>(steps - done, 1 + static_cast<std::int64_t>(random.next() * 40.0));
+        sim.advance(n);
+        done += n;
+        sim.rebuild_now();
+        if (random.next() < 0.2) sim.rebuild_now();
+      }
+    };
+    EngineOptions engine;
+    engine.fused = seed == 2, engine.batch = 128;
+    expect_same(run(pressed_bed(engine), bed_steps, rebuilding), reference(), "rebuilds, seed " + std::to_string(seed));
+  }
+}
+
+TEST(Determinism, FiftyRepetitionsGiveOneHash) {
+  BedOptions o;
+  o.nx = 7, o.ny = 6, o.nz = 6, o.speed = 1.0;
+  for (const int threads : {2, 4}) {
+    EngineOptions engine;
+    engine.threads = threads, engine.batch = 16, engine.executor = Executor::flow_graph;
+    engine.instruction_set = available_instruction_sets().back();
+    std::uint64_t first = 0;
+    for (int k = 0; k < 50; ++k) {
+      engine.fused = k % 2 == 1;
+      const Outcome r = run(scenes::bed(o, scenes::full_law(), engine), 100);
+      if (k == 0) first = r.hash;
+      EXPECT_EQ(r.hash, first) << threads << " threads, repetition " << k;
+    }
+  }
+}
+
+// Sides taken away, plates removed, a step that changes: each in mid-run, with another engine.
+TEST(Determinism, InterventionsInMidRun) {
+  const Way eventful = [](Simulation& sim, std::int64_t steps) {
+    sim.advance(steps / 5);
+    sim.set_time_step(0.75e-5);
+    sim.advance(steps / 5);
+    sim.set_plane_velocity(plate_top, 0.4);
+    sim.advance(steps / 5);
+    sim.open_sides();
+    sim.advance(steps / 5);
+    sim.remove_plane(plate_top);
+    sim.advance(steps / 5);
+  };
+  const Outcome wanted = run(pressed_bed({}), bed_steps, eventful);
+  for (const int threads : {2, 3}) {
+    EngineOptions engine;
+    engine.threads = threads, engine.batch = 32 * threads, engine.fused = threads == 3, engine.unroll = 5 * threads;
+    engine.inner_gap = 0.03 * 0.0025 * threads;
+    expect_same(run(pressed_bed(engine), bed_steps, eventful), wanted, std::to_string(threads) + " threads");
+  }
+}
+
+}  // namespace
+}  // namespace platen

@@ -1,0 +1,168 @@
+// No pair is missed, however fast spheres move: runs over lists against every pair looked at in every step.
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "tests/scenes.h"
+
+namespace platen {
+namespace {
+
+using scenes::BedOptions;
+using Pairs = std::set<std::pair<std::int64_t, std::int64_t>>;
+
+struct Scene {
+  const char* name;
+  SimulationSetup setup;
+  double dt;
+  int steps;
+  double z_top, top_velocity;  // no plates where z_top is 0
+};
+
+PairLaw stiff_law() {  // so that 20 m/s press spheres together by a tenth of a radius
+  PairLaw law = scenes::full_law();
+  law.k1 = 2e5, law.k2 = 8e5, law.k_adh = 2e4;
+  return law;
+}
+
+std::vector<Scene> fast_scenes() {
+  std::vector<Scene> list;
+  {  // a loose cloud, falling as a whole, with a few spheres at 5 to 50 m/s in it
+    BedOptions o;
+    o.nx = o.ny = 6, o.nz = 7, o.spacing = 2.6, o.speed = 0.3;
+    SimulationSetup s = scenes::bed(o, stiff_law(), {});
+    for (std::size_t k = 0; k < s.spheres.id.size(); ++k) s.spheres.velocity[3 * k + 2] -= 1.0;
+    const double speeds[] = {5, -20, 50, -35, 12};
+    for (std::size_t k = 0; k < 5; ++k) s.spheres.velocity[3 * (31 + 47 * k) + k % 3] = speeds[k];
+    list.push_back({"projectiles in rain", s, 5e-7, 960, scenes::height_of(o) + 1e-4, 0.0});
+  }
+  {  // spheres deep in one another at rest: speeds of 10 m/s out of nothing, between two looks
+    BedOptions o;
+    o.nx = o.ny = 5, o.nz = 6, o.spacing = 1.75, o.speed = 0.0;
+    list.push_back({"burst", scenes::bed(o, stiff_law(), {}), 1e-6, 480, 0.0, 0.0});
+  }
+  {  // a heap at rest that a fast plate runs into
+    BedOptions o;
+    o.nx = o.ny = 4, o.nz = 6, o.spacing = 2.02, o.speed = 0.0;
+    list.push_back({"fast plate", scenes::bed(o, stiff_law(), {}), 1e-6, 640, scenes::height_of(o) + 1e-3, -8.0});
+  }
+  {  // a small sphere shot through the gaps of large ones
+    BedOptions o;
+    o.nx = o.ny = 5, o.nz = 5, o.spacing = 2.1, o.speed = 0.1, o.spread = 0.6, o.periodic = false;
+    SimulationSetup s = scenes::bed(o, stiff_law(), {});
+    for (std::size_t k = 7; k < s.spheres.id.size(); k += 40) s.spheres.velocity[3 * k] = 15.0;
+    list.push_back({"unequal, open sides", s, 5e-7, 640, 0.0, 0.0});
+  }
+  return list;
+}
+
+void begin(Simulation& sim, const Scene& scene) {
+  sim.set_time_step(scene.dt);
+  if (scene.z_top > 0.0) scenes::add_plates(sim, scene.z_top, scene.top_velocity);
+}
+
+// Every pair that touches, by looking at all.
+Pairs touching(const Simulation& sim, const SimulationSetup& setup) {
+  const Particles& p = sim.state();
+  const double W = setup.periodic ? setup.width : 0.0, D = setup.periodic ? setup.depth : 0.0;
+  const auto nearest = [](double d, double L) { return L > 0.0 ? std::remainder(d, L) : d; };
+  Pairs pairs;
+  for (std::size_t a = 0; a < static_cast<std::size_t>(p.count); ++a)
+    for (std::size_t b = a + 1; b < static_cast<std::size_t>(p.count); ++b) {
+      const double dx = nearest(p.x[a] - p.x[b], W), dy = nearest(p.y[a] - p.y[b], D), dz = p.z[a] - p.z[b];
+      const double reach = p.radius_of(static_cast<std::int32_t>(a)) + p.radius_of(static_cast<std::int32_t>(b));
+      if (!(std::sqrt(dx * dx + dy * dy + dz * dz) < reach)) continue;
+      const std::int64_t i = p.id_of_rank[static_cast<std::size_t>(p.rank[a])], j = p.id_of_rank[static_cast<std::size_t>(p.rank[b])];
+      pairs.insert({std::min(i, j), std::max(i, j)});
+    }
+  return pairs;
+}
+
+Pairs listed(Simulation& sim) {
+  const Snapshot s = sim.snapshot();
+  Pairs pairs;
+  for (std::size_t k = 0; k < s.contacts.size(); ++k) pairs.insert({s.contacts.pair[2 * k], s.contacts.pair[2 * k + 1]});
+  return pairs;
+}
+
+TEST(Lists, NoPairIsMissedAtAnySpeed) {
+  std::int64_t redone = 0;
+  for (Scene scene : fast_scenes()) {
+    SCOPED_TRACE(scene.name);
+    scene.setup.engine.instruction_set = available_instruction_sets().back();
+    scene.setup.engine.batch = 32;
+    // Chunks of 32 over lists as the engine sees fit, one step at a time over the same lists, and one step at a time
+    // with new lists before each.
+    Simulation chunks(scene.setup), single(scene.setup), fresh(scene.setup);
+    begin(chunks, scene), begin(single, scene), begin(fresh, scene);
+    std::size_t met = 0;
+    Pairs before = touching(single, scene.setup);
+    for (int step = 1; step <= scene.steps; ++step) {
+      single.advance(1);
+      fresh.rebuild_now();
+      fresh.advance(1);
+      const Pairs all = touching(single, scene.setup);
+      ASSERT_EQ(listed(single), all) << "step " << step;
+      ASSERT_EQ(single.measure().contacts, static_cast<std::int64_t>(all.size())) << "step " << step;
+      for (const auto& pair : all) met += before.count(pair) == 0 ? 1 : 0;
+      before = all;
+      if (step % 32 != 0) continue;
+      chunks.advance(32);
+      const std::uint64_t hash = fresh.state_hash();
+      ASSERT_EQ(chunks.state_hash(), hash) << "step " << step;
+      ASSERT_EQ(single.state_hash(), hash) << "step " << step;
+      ASSERT_EQ(chunks.measure().energy_residual, fresh.measure().energy_residual) << "step " << step;
+    }
+    EXPECT_GT(met, 10u) << "pairs that met";
+    EXPECT_EQ(fresh.counters().rebuilds, scene.steps + 1);
+    RecordProperty(std::string("redone, ") + scene.name, static_cast<int>(chunks.counters().redone_steps));
+    redone += chunks.counters().redone_steps;
+  }
+  EXPECT_GT(redone, 0) << "the way back was never taken";
+}
+
+// Steps done again leave no trace with several threads and in other laws either.
+TEST(Lists, StepsDoneAgainLeaveNoTrace) {
+  for (const scenes::LawCase& c : scenes::laws_of_scenes()) {
+    SCOPED_TRACE(c.name);
+    BedOptions o;
+    o.nx = o.ny = 5, o.nz = 6, o.spread = c.spread, o.spacing = 1.6, o.speed = 0.0;
+    SimulationSetup setup = scenes::bed(o, c.law, {});
+    setup.engine.instruction_set = available_instruction_sets().back();
+    setup.engine.batch = 16;
+    const double z_top = scenes::height_of(o) + 1e-5;
+    SimulationSetup other = setup;
+    other.engine.inner_gap = 0.8 * o.R, other.engine.skin = o.R, other.engine.unroll = 1;
+    setup.engine.inner_gap = 1e-3 * o.R, setup.engine.threads = 2;
+    Simulation narrow(setup), wide(other);
+    for (Simulation* sim : {&narrow, &wide}) {
+      sim->set_time_step(1e-5);
+      scenes::add_plates(*sim, z_top, -0.2);
+      sim->count_inserted();
+      sim->advance(320);
+    }
+    EXPECT_GT(narrow.counters().redone_steps, 0);
+    EXPECT_EQ(narrow.state_hash(), wide.state_hash());
+    const Measures a = narrow.measure(), b = wide.measure();
+    EXPECT_EQ(a.energy_residual, b.energy_residual);
+    EXPECT_EQ(a.ledger.dissipated(), b.ledger.dissipated());
+    EXPECT_EQ(a.ledger.plate_work, b.ledger.plate_work);
+  }
+}
+
+// The places that fill up the last vector rest while the bed falls: they must not pass for fast spheres.
+TEST(Lists, PaddingDoesNotMove) {
+  BedOptions o;
+  o.nx = o.ny = 3, o.nz = 3, o.spacing = 2.5, o.speed = 0.0;  // 27 spheres
+  SimulationSetup s = scenes::bed(o, scenes::full_law(), {});
+  for (std::size_t k = 0; k < s.spheres.id.size(); ++k) s.spheres.velocity[3 * k + 2] = -5.0;
+  Simulation sim(s);
+  sim.set_time_step(1e-5);
+  sim.advance(2000);  // 0.1 m, 40 radii
+  EXPECT_LE(sim.counters().rebuilds, 2);
+  EXPECT_LE(sim.counters().prunes, 2);
+  EXPECT_EQ(sim.counters().redone_steps, 0);
+}
+
+}  // namespace
+}  // namespace platen
