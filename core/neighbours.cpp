@@ -1,6 +1,7 @@
 #include "core/neighbours.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -8,7 +9,13 @@ namespace platen {
 
 namespace {
 
-double nearest(double d, double length) { return length > 0.0 ? d - length * std::nearbyint(d / length) : d; }
+double nearest(double d, double length) {
+  const double half = 0.5 * length;
+  if (std::fabs(d) <= half || length == 0.0) return d;
+  // Differences of wrapped positions are at most one length off; others take the long way.
+  d -= std::copysign(length, d);
+  return std::fabs(d) <= half ? d : d - length * std::nearbyint(d / length);
+}
 
 struct Bounds {
   double low[3], high[3];
@@ -143,17 +150,29 @@ std::vector<std::int32_t> morton_order(const Particles& particles) {
   const Bounds b = bounds_of(particles);
   double side = 0.0;
   for (int axis = 0; axis < 3; ++axis) side = std::max(side, b.high[axis] - b.low[axis]);
-  const double scale = side > 0.0 ? 2097151.0 / side : 0.0;
-  std::vector<std::pair<std::uint64_t, std::int32_t>> keys(static_cast<std::size_t>(particles.count));
-  for (std::size_t k = 0; k < keys.size(); ++k) {
+  // 11 bits an axis: finer cells than any bed has spheres across. Sorted by three passes over 11 bits each.
+  const double scale = side > 0.0 ? 2047.0 / side : 0.0;
+  const auto n = static_cast<std::size_t>(particles.count);
+  std::vector<std::uint64_t> keys(n), other_keys(n);
+  std::vector<std::int32_t> order(n), other_order(n);
+  for (std::size_t k = 0; k < n; ++k) {
     const auto cell = [&](double x, double low) { return static_cast<std::uint64_t>((x - low) * scale); };
-    keys[k] = {spread(cell(particles.x[k], b.low[0])) | spread(cell(particles.y[k], b.low[1])) << 1 |
-                   spread(cell(particles.z[k], b.low[2])) << 2,
-               static_cast<std::int32_t>(k)};
+    keys[k] = spread(cell(particles.x[k], b.low[0])) | spread(cell(particles.y[k], b.low[1])) << 1 |
+              spread(cell(particles.z[k], b.low[2])) << 2;
+    order[k] = static_cast<std::int32_t>(k);
   }
-  std::sort(keys.begin(), keys.end());
-  std::vector<std::int32_t> order(keys.size());
-  for (std::size_t k = 0; k < keys.size(); ++k) order[k] = keys[k].second;
+  for (int pass = 0; pass < 3; ++pass) {
+    std::array<std::uint32_t, 2049> start{};
+    const auto digit = [&](std::uint64_t key) { return static_cast<std::size_t>(key >> (11 * pass) & 2047); };
+    for (const std::uint64_t key : keys) ++start[digit(key) + 1];
+    for (std::size_t d = 1; d < start.size(); ++d) start[d] += start[d - 1];
+    for (std::size_t k = 0; k < n; ++k) {
+      const std::uint32_t to = start[digit(keys[k])]++;
+      other_keys[to] = keys[k];
+      other_order[to] = order[k];
+    }
+    keys.swap(other_keys), order.swap(other_order);
+  }
   return order;
 }
 

@@ -349,8 +349,9 @@ void Simulation::prepare_graph() {
 void Simulation::advance(std::int64_t steps) {
   const FloatMode mode;
   ensure_forces();
+  bool one_by_one = false;
   while (steps > 0) {
-    const int n = prepare_lists(steps);
+    const int n = prepare_lists(one_by_one ? 1 : steps);
     save();
     run_chunk(n);
     double path = 0.0;
@@ -372,6 +373,11 @@ void Simulation::advance(std::int64_t steps) {
       continue;
     }
     if (bad || !std::isfinite(path)) {
+      if (n > 1) {  // once more step by step, so that the message tells where it began
+        restore();
+        one_by_one = true;
+        continue;
+      }
       step_ += n;
       fail("forces or velocities out of range");
     }

@@ -116,7 +116,7 @@ int Simulation::prepare_lists(std::int64_t wanted) {
   double widest = widest_skin * R;
   if (periodic()) widest = std::max(0.0, 0.5 * std::min(domain_.width, domain_.depth) - 2.0 * R);
   const double skin_wish = engine_.skin > 0.0 ? engine_.skin : usual_skin * R;
-  const double gap_wish = engine_.inner_gap > 0.0 ? engine_.inner_gap : std::max(smallest_gap * R, 8.0 * path(n));
+  const double gap_wish = engine_.inner_gap > 0.0 ? engine_.inner_gap : std::max(smallest_gap * R, 3.0 * path(n));
   const double most = std::min(widest, std::max(skin_wish, widest_skin * R));
   double gap = std::min(gap_wish, 0.5 * most);
   if (2.0 * path(1) * caution > gap) gap = 2.0 * path(1) * caution;

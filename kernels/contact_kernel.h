@@ -224,6 +224,9 @@ void contact_kernel(const PairBatch& b, const LawConstants& c, PairTotals& total
       // Written so that a NaN counts as out of range.
       const Real size2 = I::max(dot(forces.F, forces.F), forces.S_i * forces.S_i);
       auto fine = I::both(size2 < force_bound2, dot(forces.F, forces.F) < force_bound2);
+      // An overlap above R, the centre of one sphere deep inside the other, is no contact any more: a lever below R/2.
+      const auto shallow = I::both(pairs.lever_i >= I::set(0.5), pairs.lever_j >= I::set(0.5));
+      fine = I::both(fine, I::either(I::negate(forces.touching), shallow));
       if constexpr (scene.energy) {
         Real largest = I::set(0.0);
         for (int term = 0; term < term_count; ++term)

@@ -27,6 +27,13 @@ auto contact_of_scene(int scene, std::integer_sequence<int, scenes...>) {
   return found;
 }
 
+template <class I, int... scenes>
+bool equal_spheres_of(int scene, std::integer_sequence<int, scenes...>) {  // by constants: the list itself is not emitted
+  bool equal = false;
+  ((scene == scenes ? void(equal = std::bool_constant<built_scenes[scenes].traits.equal_spheres>::value) : void()), ...);
+  return equal;
+}
+
 template <class I, bool energy>
 auto motion_of(bool equal_spheres, bool rolling) {
   decltype(KernelTable::motion) all[2][2] = {
@@ -40,10 +47,10 @@ KernelTable kernels_of(InstructionSet set, const KernelRequest& request) {
   constexpr auto scenes = std::make_integer_sequence<int, static_cast<int>(built_scenes.size())>();
   KernelTable table;
   table.instruction_set = set;
-  table.scene = request.scene >= 0 ? request.scene : cheapest_scene(request.needed);
+  table.scene = request.scene;  // choose_kernels has chosen
   table.energy = request.needed.energy;
   table.reproducible = request.reproducible;
-  const SceneTraits& traits = built_scenes[static_cast<std::size_t>(table.scene)].traits;
+  const bool equal_spheres = equal_spheres_of<I>(table.scene, scenes);
   if (request.reproducible) {
     table.contacts = table.energy ? contact_of_scene<I, true, true>(table.scene, scenes)
                                   : contact_of_scene<I, false, true>(table.scene, scenes);
@@ -53,8 +60,8 @@ KernelTable kernels_of(InstructionSet set, const KernelRequest& request) {
                                   : contact_of_scene<I, false, false>(table.scene, scenes);
     table.plates = &plate_kernel<I, false>;
   }
-  table.motion = table.energy ? motion_of<I, true>(traits.equal_spheres, request.rolling)
-                              : motion_of<I, false>(traits.equal_spheres, request.rolling);
+  table.motion = table.energy ? motion_of<I, true>(equal_spheres, request.rolling)
+                              : motion_of<I, false>(equal_spheres, request.rolling);
   return table;
 }
 

@@ -41,7 +41,9 @@ InstructionSet preferred_instruction_set() {
   throw std::invalid_argument("PLATEN_ISA=" + std::string(forced) + ": this processor has " + known);
 }
 
-KernelTable choose_kernels(InstructionSet set, const KernelRequest& request) {
+KernelTable choose_kernels(InstructionSet set, const KernelRequest& asked) {
+  KernelRequest request = asked;
+  if (request.scene < 0) request.scene = cheapest_scene(request.needed);
   switch (set) {
     case InstructionSet::avx2: return kernels_avx2(request);
     case InstructionSet::avx512: return kernels_avx512(request);

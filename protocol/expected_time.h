@@ -24,6 +24,7 @@ EngineSpeed measure_speed(const Case& c, std::int64_t count, bool equal, double 
 struct BedGuess {
   double rain_height = 0.0;  // of the gas that rains down [m]
   double height = 0.0;       // of the settled bed [m]
+  double porosity = 0.42;    // of the settled bed
 };
 
 struct ExpectedStage {

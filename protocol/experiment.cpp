@@ -51,6 +51,7 @@ class Experiment {
         StageResult failed = current_;
         failed.end_reason = "failed";
         failed.reached = false;
+        failed.last_step = sim_->step(), failed.time_end = sim_->time();
         if (stage_open_) closed_.push_back(failed);
       }
       folder_.log("failed", {{"message", outcome.message}}, LogLevel::error);
@@ -130,7 +131,7 @@ class Experiment {
   }
 
   // The automatic step, or the watch over a fixed one.
-  void watch_time_step() {
+  void watch_time_step(Stand& stand) {
     const StepLimits limits = sim_->step_limits();
     const Measures m = sim_->measure(false);
     if (c_.time.step) {
@@ -138,7 +139,7 @@ class Experiment {
       if (ratio > 1.0 && !c_.time.allow_unstable)
         throw RunError(fmt::format("the time step {:.4g} s is above dt_limit = {:.4g} s of the bed at step {}; use a smaller time.step or \"auto\"",
                                    sim_->time_step(), limits.dt_limit, sim_->step()));
-      if (ratio > 0.9) warn(fmt::format("time step at {:.2f} dt_limit", ratio));
+      if (ratio > 0.9) warn(ratio > 1.0 ? "time step above dt_limit" : "time step above 0.9 dt_limit");
       return;
     }
     StepLimits ruling = limits;
@@ -146,6 +147,7 @@ class Experiment {
     // A loose bed says nothing of the dense one that it is about to become.
     if (m.coordination_number < 3.0) ruling.dt_crit = std::min(ruling.dt_crit, free.dt_crit), ruling.dt_limit = std::min(ruling.dt_limit, free.dt_limit);
     sim_->set_time_step(floor_to_grid(std::min(c_.time.safety * ruling.dt_crit, 0.8 * ruling.dt_limit)));
+    stand.time_step_changed();
   }
 
   void warn(const std::string& text) {
@@ -171,20 +173,19 @@ class Experiment {
     current_.particles = sim_->particles();
     stage_open_ = true;
 
-    Stand stand{*sim_, c_, spec, sim_->step(), sim_->time(), strain_zero_height_};
+    Stand stand{*sim_, c_, spec, sim_->step(), sim_->time(), strain_zero_height_, sim_->step(), 0.0};
     Stage stage = make_stage(spec);
     std::visit([&](auto& s) { s.begin(stand); }, stage);
-    if (spec.kind != StageKind::unload && spec.kind != StageKind::hold) stand.strain_zero_height.reset();
+    if (spec.kind == StageKind::vibrate || spec.kind == StageKind::release) stand.strain_zero_height.reset();  // another bed
     strain_zero_height_ = stand.strain_zero_height;
     const double speed = spec.speed;
     sample(index, speed);
 
     End end = End::done;
     std::int64_t next_sample = sim_->step() + steps_to_sample();
-    const std::int64_t grid = c_.engine.check_every;
+    const std::int64_t grid = c_.engine.check_every, limits_grid = std::max<std::int64_t>(1, limits_every / grid) * grid;
     for (;;) {
       // On the grid, in absolute step numbers: goals, servo, time step. A stage that needs no time ends at its first look.
-      const auto exact = std::visit([&](auto& s) { return s.last_step(stand); }, stage);
       const bool first_look = sim_->step() == stand.first_step, on_grid = sim_->step() % grid == 0;
       bool over = false;
       if (on_grid || first_look) {
@@ -196,13 +197,16 @@ class Experiment {
         if (!first_look || spec.kind == StageKind::fill)
           if (const auto reason = std::visit([&](auto& s) { return s.done(stand, look); }, stage)) current_.end_reason = *reason, over = true;
         guard(m);
-        if (on_grid && !first_look && sim_->step() % limits_every == 0) {
-          watch_time_step();
+        if (on_grid && !first_look && sim_->step() % limits_grid == 0) {
+          watch_time_step(stand);
           next_sample = sim_->step() + steps_to_sample();
         }
       }
+      // After the time step may have changed.
+      const auto exact = std::visit([&](auto& s) { return s.last_step(stand); }, stage);
+      const std::int64_t longest = stand.step_not_before(spec.max_duration);
       if (!over && exact && sim_->step() >= *exact) over = true, current_.end_reason = exact_reason(spec);
-      if (!over && stand.stage_time() >= spec.max_duration) {
+      if (!over && sim_->step() >= longest) {
         over = true, end = End::goal_missed;
         current_.reached = false;
         current_.end_reason = fmt::format("goal not reached within max_duration = {:.4g} s", spec.max_duration);
@@ -219,8 +223,7 @@ class Experiment {
       std::int64_t target = (sim_->step() / grid + 1) * grid;
       if (exact) target = std::min(target, std::max(*exact, sim_->step() + 1));
       target = std::min(target, next_sample);
-      const auto longest = sim_->step() + static_cast<std::int64_t>(std::ceil((spec.max_duration - stand.stage_time()) / sim_->time_step()));
-      target = std::min(target, std::max(longest, sim_->step() + 1));
+      target = std::min(target, longest);
       sim_->advance(target - sim_->step());
       show_progress(index, stand, exact, stage_begin);
     }
@@ -246,7 +249,8 @@ class Experiment {
   }
 
   static std::string exact_reason(const StageSpec& spec) {
-    if (spec.until.displacement && !spec.until.duration) return fmt::format("displacement {} done", pretty(*spec.until.displacement, "m"));
+    const bool moves = spec.until.displacement.has_value();
+    if (moves && !(spec.until.duration && *spec.until.duration < *spec.until.displacement / spec.speed)) return fmt::format("displacement {} done", pretty(*spec.until.displacement, "m"));
     const double duration = spec.duration.value_or(spec.until.duration.value_or(0.0));
     return fmt::format("duration {} over", pretty(duration, "s"));
   }

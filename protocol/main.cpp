@@ -1,14 +1,24 @@
 // The program `platen`: command line in, exit code out. What the commands do is in *_command.cpp.
 #include <CLI/CLI.hpp>
+#include <fmt/format.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
+#include <functional>
+#include <memory>
 #include <new>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "core/simulation.h"
 #include "kernels/kernel_table.h"
+#include "protocol/case_reader.h"
 #include "protocol/check_command.h"
 #include "protocol/experiment.h"
 #include "protocol/info.h"
@@ -29,7 +39,8 @@ void set_up_log() {
   auto sink = std::make_shared<spdlog::sinks::stderr_color_sink_st>(
       may_colour(stderr) ? spdlog::color_mode::always : spdlog::color_mode::never);
   auto log = std::make_shared<spdlog::logger>("platen", sink);
-  log->set_pattern("%v");
+  sink->set_color(spdlog::level::info, "");  // only warnings and errors stand out
+  log->set_pattern("%^%v%$");
   spdlog::set_default_logger(log);
 }
 
@@ -40,7 +51,7 @@ struct Command {
 };
 
 CLI::Option* add_case(CLI::App& app, std::filesystem::path& file) {
-  return app.add_option("CASE", file, "the case file (TOML)")->required();
+  return app.add_option("CASE", file, "the case file (TOML)")->type_name("FILE")->required();
 }
 
 void add_overrides(CLI::App& app, std::vector<std::string>& overrides) {
@@ -65,6 +76,15 @@ double option_value(const char* option, const std::string& text, Quantity quanti
   }
 }
 
+// Before a case is read: the user may have asked for kernels that this processor does not have.
+void check_instruction_set() {
+  try {
+    preferred_instruction_set();
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(error.what());
+  }
+}
+
 Command add_run(CLI::App& program) {
   CLI::App* app = program.add_subcommand("run", "run a case into a folder");
   auto command = std::make_shared<RunCommand>();
@@ -81,7 +101,7 @@ Command add_run(CLI::App& program) {
   app->add_flag("--json", command->json, "print the summary as JSON");
   app->add_flag("-q,--quiet", command->quiet, "print nothing but errors");
   return {app, "platen run protocol/cases/quick.toml -o runs/first --set stage.compress.speed='\"20 mm/s\"'", [=] {
-            preferred_instruction_set();
+            check_instruction_set();
             if (!walltime->empty()) command->max_walltime = parse_walltime(*walltime);
             return run_command(*command);
           }};
@@ -94,7 +114,10 @@ Command add_check(CLI::App& program) {
   add_overrides(*app, command->overrides);
   add_threads(*app, command->threads);
   app->add_flag("--json", command->json, "print JSON");
-  return {app, "platen check protocol/cases/cohesive.toml", [=] { return check_command(*command); }};
+  return {app, "platen check protocol/cases/cohesive.toml", [=] {
+            check_instruction_set();
+            return check_command(*command);
+          }};
 }
 
 Command add_law(CLI::App& program) {
@@ -130,19 +153,13 @@ Command add_info(CLI::App& program) {
   CLI::App* app = program.add_subcommand("info", "say what is in a run folder, an HDF5 file or a case file");
   auto path = std::make_shared<std::filesystem::path>();
   auto json = std::make_shared<bool>(false);
-  app->add_option("PATH", *path, "run folder, HDF5 file or case file")->required();
+  app->add_option("PATH", *path, "run folder, HDF5 file or case file")->type_name("FILE|DIR")->required();
   app->add_flag("--json", *json, "print JSON");
   return {app, "platen info runs/quick", [=] {
             const std::string text = describe(*path, *json);
             std::fwrite(text.data(), 1, text.size(), stdout);
             return static_cast<int>(exit_done);
           }};
-}
-
-// A command without any argument: how it is used, rather than the first thing that is missing.
-int explain(const CLI::App& app, const char* example) {
-  std::fprintf(stderr, "%sExample:\n  %s\n", app.help().c_str(), example);
-  return exit_usage;
 }
 
 int usage_error(const std::string& message, const std::string& command) {
@@ -165,9 +182,16 @@ int run_program(int argc, char** argv) {
   }
   for (const Command& command : commands)
     if (argc == 2 && command.app->get_name() == argv[1]) {
-      std::fputs(command.app->help().c_str(), stderr);
+      std::fputs(command.app->help("platen").c_str(), stderr);
       return exit_usage;
     }
+  std::vector<std::string> names;
+  for (const Command& command : commands) names.push_back(command.app->get_name());
+  if (argv[1][0] != '-' && std::find(names.begin(), names.end(), argv[1]) == names.end()) {
+    const std::string nearest = nearest_word(argv[1], names);
+    return usage_error(fmt::format("there is no command \"{}\"; allowed: {}{}", argv[1], fmt::join(names, ", "),
+                                   nearest.empty() ? "" : "; did you mean " + nearest + "?"), "");
+  }
   try {
     program.parse(argc, argv);
   } catch (const CLI::Success& asked) {  // --help, --version

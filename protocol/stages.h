@@ -31,8 +31,13 @@ struct Stand {
   std::int64_t first_step = 0;    // of the stage
   double first_time = 0.0;        // [s]
   std::optional<double> strain_zero_height;  // [m]; kept from compress to unload and hold
+  // Where the present time step began to hold: what is counted from here does not depend on when somebody looks.
+  std::int64_t dt_step = 0;
+  double dt_time = 0.0;           // of the stage [s]
   double stage_time() const { return sim.time() - first_time; }
-  std::int64_t step_at(double stage_seconds) const;  // nearest step to a time of the stage
+  void time_step_changed() { dt_step = sim.step(), dt_time = stage_time(); }
+  std::int64_t step_at(double stage_seconds) const;        // nearest step to a time of the stage
+  std::int64_t step_not_before(double stage_seconds) const;
 };
 
 // One look at the bed on the check grid; no stored energies.
@@ -54,6 +59,7 @@ class RestWatch {
   };
   std::deque<Sample> samples_;
   double kinetic_at_start_ = 0.0;
+  bool from_rest_ = false;        // nothing moved at the start: kinetic_at_start_ is the most that was seen since
 };
 
 struct FillStage {

@@ -4,6 +4,7 @@
 
 #include <cstdlib>
 #include <map>
+#include <set>
 
 #include "tests/scenes.h"
 
@@ -14,36 +15,42 @@ using scenes::BedOptions;
 using scenes::LawCase;
 
 // 140 spheres, no multiple of a vector, in several batches, pressed from above; fast enough to part and meet again.
-BedOptions colliding() {
+BedOptions colliding(double spread = 0.0) {
   BedOptions o;
   o.nx = 5, o.ny = 4, o.nz = 7;
   o.speed = 0.6;
+  o.spread = spread, o.spacing = spread > 0.0 ? 1.75 : 2.02;
   return o;
 }
 
-struct Run {
+struct Result {
   std::uint64_t hash = 0;
   Measures measures;
   bool seen[4] = {};  // branches
   std::size_t plate_contacts = 0;
-  std::int64_t gained = 0, lost = 0;  // contacts
+  int met = 0, parted = 0;  // pairs
 };
 
-Run run(const LawCase& c, const EngineOptions& engine, int steps = 300, double spread = -1.0) {
-  BedOptions o = colliding();
-  o.spread = spread >= 0.0 ? spread : c.spread;
+Result run(const LawCase& c, const EngineOptions& engine, int steps = 300) {
+  const BedOptions o = colliding(c.spread);
   Simulation sim(scenes::bed(o, c.law, engine));
   sim.set_time_step(1e-5);
   scenes::add_plates(sim, scenes::height_of(o) + 0.02 * o.R, -0.5);
-  Run r;
-  std::int64_t before = sim.measure().contacts;
+  Result r;
+  const auto touching = [](const Snapshot& s) {
+    std::set<std::pair<std::int64_t, std::int64_t>> pairs;
+    for (std::size_t k = 0; k < s.contacts.size(); ++k) pairs.insert({s.contacts.pair[2 * k], s.contacts.pair[2 * k + 1]});
+    return pairs;
+  };
+  auto before = touching(sim.snapshot());
   for (int block = 0; block < steps; block += 30) {
     sim.advance(30);
     const Snapshot s = sim.snapshot();
     for (const std::int8_t branch : s.contacts.branch) r.seen[branch] = true;
     r.plate_contacts += s.plate_contacts.size();
-    const auto now = static_cast<std::int64_t>(s.contacts.size());
-    r.gained += std::max<std::int64_t>(0, now - before), r.lost += std::max<std::int64_t>(0, before - now);
+    const auto now = touching(s);
+    for (const auto& pair : now) r.met += before.count(pair) == 0 ? 1 : 0;
+    for (const auto& pair : before) r.parted += now.count(pair) == 0 ? 1 : 0;
     before = now;
   }
   r.hash = sim.state_hash();
@@ -61,6 +68,11 @@ EngineOptions options(InstructionSet set, bool reproducible, int scene) {
 // Of --reproducible runs after 300 steps. A scene with an exponent of its own calls pow, whose last bit is the
 // business of the C library and the processor, so it has no entry. PLATEN_PRINT_GOLDEN=1 prints the table.
 const std::map<std::string, std::uint64_t> golden = {
+    {"elastic", 0x5e54a4b1fc48ec55ULL},
+    {"cohesionless", 0xc20e9f4dfba9e26aULL},
+    {"full", 0xdcdfb6dfdbe8836fULL},
+    {"full_wide", 0x34abb5e8daa70ef4ULL},
+    {"three_halves", 0xa1a939eef6ae771fULL},
 };
 
 TEST(Bits, ReproducibleIsTheSameOnEveryInstructionSet) {
@@ -70,17 +82,17 @@ TEST(Bits, ReproducibleIsTheSameOnEveryInstructionSet) {
     SCOPED_TRACE(c.name);
     const SceneTraits& traits = built_scenes[static_cast<std::size_t>(c.scene)].traits;
     covered[static_cast<std::size_t>(c.scene)] = true;
-    const Run first = run(c, options(InstructionSet::scalar, true, c.scene));
+    const Result first = run(c, options(InstructionSet::scalar, true, c.scene));
     for (const InstructionSet set : available_instruction_sets()) {
-      const Run other = run(c, options(set, true, c.scene));
+      const Result other = run(c, options(set, true, c.scene));
       EXPECT_EQ(other.hash, first.hash) << to_string(set);
       EXPECT_EQ(other.measures.ledger.dissipated(), first.measures.ledger.dissipated()) << to_string(set);
       EXPECT_EQ(other.measures.ledger.plate_work, first.measures.ledger.plate_work) << to_string(set);
     }
     // The run went through everything that the scene has.
     const Ledger& l = first.measures.ledger;
-    EXPECT_GT(first.gained, 0);
-    EXPECT_GT(first.lost, 0);
+    EXPECT_GT(first.met, 5);
+    EXPECT_GT(first.parted, 5);
     EXPECT_GT(first.plate_contacts, 10u);
     EXPECT_GT(l.viscous_dissipation, 0.0);
     EXPECT_GT(l.sliding_dissipation, 0.0);
@@ -93,20 +105,21 @@ TEST(Bits, ReproducibleIsTheSameOnEveryInstructionSet) {
       EXPECT_TRUE(first.seen[static_cast<int>(Branch::adhesive)]);
       EXPECT_GT(l.plastic_dissipation, 0.0);
     }
-    if (traits.adhesion) EXPECT_LT(l.adhesion_energy, 0.0);
+    if (traits.adhesion) {
+      EXPECT_LT(l.adhesion_energy, 0.0);
+    }
     if (traits.exponent == Exponent::any) continue;
     const std::string scene = built_scenes[static_cast<std::size_t>(c.scene)].name;
     if (print) std::printf("    {\"%s\", 0x%016llxULL},\n", scene.c_str(), static_cast<unsigned long long>(first.hash));
     const auto it = golden.find(scene);
-    ASSERT_NE(it, golden.end()) << "no golden hash for " << scene;
-    EXPECT_EQ(first.hash, it->second) << "golden hash of " << scene;
+    EXPECT_TRUE(it != golden.end() && first.hash == it->second) << "golden hash of " << scene << ": " << first.hash;
   }
   for (std::size_t k = 0; k < covered.size(); ++k) EXPECT_TRUE(covered[k]) << "no law for " << built_scenes[k].name;
 }
 
 TEST(Bits, AHashSeesOneBit) {
   const LawCase c = scenes::laws_of_scenes()[2];
-  BedOptions o = colliding();
+  const BedOptions o = colliding();
   SimulationSetup a = scenes::bed(o, c.law, {}), b = a;
   b.spheres.position[7] = std::nextafter(b.spheres.position[7], 1.0);
   Simulation one(a), two(b), three(a);
@@ -151,12 +164,12 @@ TEST(Bits, AWiderSceneGivesTheBitsOfTheNarrowest) {
     for (const InstructionSet set : available_instruction_sets())
       for (const bool reproducible : {false, true}) {
         const SceneTraits needed = needs(c);
-        const Run narrow = run(c, options(set, reproducible, -1), 120);
+        const Result narrow = run(c, options(set, reproducible, -1), 120);
         for (std::size_t k = 0; k < built_scenes.size(); ++k) {
           const SceneTraits& wide = built_scenes[k].traits;
           if (!covers(wide, needed) || wide.exponent != needed.exponent) continue;
           SCOPED_TRACE(std::string(c.name) + " on " + built_scenes[k].name + ", " + to_string(set));
-          const Run other = run(c, options(set, reproducible, static_cast<int>(k)), 120);
+          const Result other = run(c, options(set, reproducible, static_cast<int>(k)), 120);
           EXPECT_EQ(other.hash, narrow.hash);
           EXPECT_EQ(other.measures.ledger.dissipated(), narrow.measures.ledger.dissipated());
           EXPECT_EQ(other.measures.energy_residual, narrow.measures.energy_residual);
@@ -191,7 +204,7 @@ TEST(Bits, TheLedgerChangesNone) {
     for (const InstructionSet set : available_instruction_sets()) {
       EngineOptions with = options(set, false, -1), without = with;
       without.energy = false;
-      const Run a = run(c, with, 90), b = run(c, without, 90);
+      const Result a = run(c, with, 90), b = run(c, without, 90);
       EXPECT_EQ(a.hash, b.hash) << c.name << ", " << to_string(set);
       EXPECT_EQ(a.measures.stress_top, b.measures.stress_top);
       EXPECT_GT(a.measures.ledger.viscous_dissipation, 0.0);
@@ -213,7 +226,7 @@ TEST(Bits, DefaultIsWithinItsBoundOfReproducible) {
   for (const InstructionSet set : available_instruction_sets()) {
     SCOPED_TRACE(to_string(set));
     const LawCase c = scenes::laws_of_scenes()[2];
-    BedOptions o = colliding();
+    const BedOptions o = colliding();
     EngineOptions quick = options(set, false, -1), exact = options(set, true, -1);
     quick.batch = exact.batch = 4096;  // one batch: its sums are the particles' whole forces
     Simulation a(scenes::bed(o, c.law, quick)), b(scenes::bed(o, c.law, exact));

@@ -9,8 +9,12 @@
 namespace platen {
 
 std::int64_t Stand::step_at(double stage_seconds) const {
-  // From here, so that a changing time step is accounted for.
-  return sim.step() + std::max<std::int64_t>(0, std::llround((stage_seconds - stage_time()) / sim.time_step()));
+  return dt_step + std::max<std::int64_t>(0, std::llround((stage_seconds - dt_time) / sim.time_step()));
+}
+
+std::int64_t Stand::step_not_before(double stage_seconds) const {
+  const double steps = (stage_seconds - dt_time) / sim.time_step();
+  return dt_step + std::max<std::int64_t>(0, std::llround(std::ceil(steps - 1e-6)));
 }
 
 std::string pretty(double value, const char* unit) {
@@ -40,6 +44,7 @@ Stage make_stage(const StageSpec& spec) {
 void RestWatch::begin(Stand& stand) {
   samples_.clear();
   kinetic_at_start_ = stand.sim.measure(false).kinetic_energy;
+  from_rest_ = kinetic_at_start_ == 0.0;
 }
 
 std::optional<std::string> RestWatch::done(Stand& stand, const Look& look) {
@@ -47,6 +52,7 @@ std::optional<std::string> RestWatch::done(Stand& stand, const Look& look) {
   const Measures& m = look.m;
   const bool gravity = stand.c.gravity > 0.0, bottom = stand.sim.plane(plate_bottom).present;
   // Without gravity there is no potential energy to compare with, without a bottom no support.
+  if (from_rest_) kinetic_at_start_ = std::max(kinetic_at_start_, m.kinetic_energy);
   const double scale = gravity ? m.potential_energy : kinetic_at_start_;
   bool quiet = m.kinetic_energy <= until.kinetic_to_potential * scale;
   if (gravity && bottom) quiet = quiet && std::fabs(m.support_force - m.weight) <= 0.01 * m.weight;
@@ -76,9 +82,14 @@ std::optional<std::string> FillStage::done(Stand& stand, const Look& look) {
   // The last spheres have landed: what still moves is a thousandth of the energy of position, and the bottom carries all.
   const Measures& m = look.m;
   if (m.contacts == 0 && stand.sim.particles() > 1) return std::nullopt;
-  if (m.kinetic_energy <= 1e-3 * m.potential_energy && std::fabs(m.support_force - m.weight) <= 0.1 * m.weight)
-    return "all spheres have landed";
-  return std::nullopt;
+  if (!(m.kinetic_energy <= 1e-3 * m.potential_energy && std::fabs(m.support_force - m.weight) <= 0.1 * m.weight)) return std::nullopt;
+  // In a large bed neither would notice a few late ones: none may be faster than from a fall by its own radius.
+  const Particles& p = stand.sim.state();
+  for (std::int32_t k = 0; k < p.count; ++k) {
+    const auto a = static_cast<std::size_t>(k);
+    if (p.vx[a] * p.vx[a] + p.vy[a] * p.vy[a] + p.vz[a] * p.vz[a] > 2.0 * stand.c.gravity * p.radius_of(k)) return std::nullopt;
+  }
+  return "all spheres have landed";
 }
 
 void FillStage::end(Stand& stand, StageResult&) {

@@ -89,14 +89,15 @@ void HoldStage::end(Stand& stand, StageResult& result) { PressStage{}.end(stand,
 
 void ReleaseStage::begin(Stand& stand) {
   Simulation& sim = stand.sim;
-  sim.open_sides();
   for (int wall : {wall_x_low, wall_x_high, wall_y_low, wall_y_high})
     if (sim.plane(wall).present) sim.remove_plane(wall);
   if (sim.plane(plate_top).present) {
     PlaneMotion top;
     top.origin = sim.plane_position(plate_top) + 1e-3;
+    sim.remove_plane(plate_top);  // what its contacts hold is removed energy, should it still be loaded
     sim.set_plane(plate_top, top);
   }
+  sim.open_sides();
   rest.begin(stand);
 }
 

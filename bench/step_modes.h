@@ -1,0 +1,43 @@
+// The tables of bench_step.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "bench/beds.h"
+#include "bench/harness.h"
+
+namespace platen::bench {
+
+struct StepOptions {
+  std::vector<std::int64_t> particles;   // empty: the mode's own
+  std::vector<int> threads;
+  std::vector<std::string> scenes;
+  std::vector<InstructionSet> sets;      // empty: the preferred one
+  double seconds = 1.0;                  // of a block
+  std::int64_t steps = 0;                // of a block; 0: from `seconds`
+  int warm = 500;                        // steps before anything is timed
+  int rounds = 5;
+  int batch = 0;
+  std::string json;
+  std::filesystem::path beds;
+};
+
+// Particles x scenes x instruction sets x threads, through Simulation::advance.
+void table_of_steps(const StepOptions& options);
+// One thread against the largest of options.threads, in turn: the ratio.
+void table_of_threads(const StepOptions& options);
+// The full scene against every other one, in turn: what a feature costs.
+void table_of_features(const StepOptions& options);
+// One thread against the scalar yardstick, in turn. Returns false where their positions differ by 1e-9 R or more after
+// 100 steps.
+bool table_of_scalar(const StepOptions& options);
+// Flow graph, split and fused, against two parallel_for a step, in turn. Returns false where their bits differ.
+bool table_of_executors(const StepOptions& options);
+// Rain from its start file, 2,000 steps or more, rebuilds included.
+void table_of_rain(const StepOptions& options);
+// One scene on one bed, one JSON line on standard output: for scripts that run other programs in turn with it.
+void one_block(const StepOptions& options, bool rain);
+
+}  // namespace platen::bench

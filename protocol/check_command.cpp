@@ -1,0 +1,226 @@
+#include "protocol/check_command.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "core/particles.h"
+#include "kernels/kernel_table.h"
+#include "protocol/experiment.h"
+#include "protocol/progress.h"
+#include "protocol/stages/rain.h"
+#include "protocol/stages/random_source.h"
+#include "protocol/usable_cores.h"
+
+namespace platen {
+namespace {
+
+constexpr double dense_porosity = 0.40;  // the bed that a plate presses [A34]
+
+// Measured: largest resident memory of dense beds of 8,000 and 97,000 spheres, contacts in the output [own runs].
+constexpr double bytes_of_program = 20e6, bytes_of_sphere = 1700.0;
+
+// A porosity that rain leaves, from own runs: 0.42 without adhesion, 0.49 where f0 is 200 times a sphere's weight; with
+// k_adh, contacts that were pressed by the fall stick too.
+double free_porosity(double bond, bool sticky) {
+  return std::clamp(0.42 + 0.013 * std::log1p(bond), sticky ? 0.50 : 0.42, 0.75);
+}
+
+std::string why_scene(const Case& c, bool equal) {
+  const PairLaw& law = c.particles.law;
+  std::vector<std::string> needs;
+  needs.push_back(fmt::format("n = {:g}", law.exponent));
+  needs.push_back(law.k_adh > 0.0 || law.f0 != 0.0 ? "adhesion (k_adh or f0)" : "no adhesion");
+  needs.push_back(law.k2 > law.k1 ? "plasticity (k2 > k1)" : "no plasticity (k2 = k1)");
+  if (law.rolling_friction == 0.0) needs.push_back("no rolling friction");
+  else needs.push_back(law.rolling_model == RollingModel::absolute ? "absolute rolling friction" : "relative rolling friction");
+  needs.push_back(equal ? "equal spheres" : "unequal spheres");
+  std::string text = "the cheapest that covers ";
+  for (std::size_t k = 0; k < needs.size(); ++k) text += (k == 0 ? "" : ", ") + needs[k];
+  return text;
+}
+
+std::string why_instruction_set() {
+  const char* forced = std::getenv("PLATEN_ISA");
+  return forced != nullptr && *forced != '\0' ? "forced by PLATEN_ISA" : "the widest that this processor has";
+}
+
+void add_inertial_numbers(const Case& c, CheckReport& report) {
+  const SphereFacts& f = report.spheres;
+  const double area = c.box.width * c.box.depth;
+  if (!(area > 0.0)) return;
+  const double height = f.solid_volume / (area * (1.0 - dense_porosity));
+  for (const StageSpec& s : c.stages) {
+    if (s.kind != StageKind::compress && s.kind != StageKind::crush) continue;
+    const auto add = [&](double stress, const char* of) {
+      if (!(stress > 0.0)) return;
+      report.inertial.push_back(
+          {s.name, stress, of, s.speed / height * 2.0 * f.radius_mean * std::sqrt(f.density / stress)});
+    };
+    add(s.strain_zero, "strain zero");
+    if (s.until.stress) add(*s.until.stress, "target");
+  }
+}
+
+void add_notes(const Case& c, CheckReport& report) {
+  if (c.particles.law.exponent < 1.0)
+    report.notes.push_back("exponent < 1: K1 = n k1 delta^(n-1) has no bound at delta = 0; in K1, and hence in the dashpots, "
+                           "k_t and the time step, max(delta, 1e-3 R) stands for delta");
+  if (c.particles.law.exponent > 1.0)
+    report.notes.push_back("exponent > 1: stiffness grows with the overlap; the first time step assumes overlaps of R/10");
+  if (c.time.step && report.limits.dt_limit < *c.time.step)
+    report.notes.push_back("time.step is above dt_limit of a dense bed; the run goes on because of time.allow_unstable");
+  for (const InertialNumber& i : report.inertial)
+    if (i.value > 1e-3)
+      report.notes.push_back(fmt::format("{}: inertial number {:.1e} at {:.3g} Pa ({}): not quasi-static there (below 1e-4 it is)",
+                                         i.stage, i.value, i.stress, i.of));
+}
+
+std::string bytes_text(double bytes) {
+  return bytes < 1e9 ? fmt::format("{:.0f} MB", bytes * 1e-6) : fmt::format("{:.1f} GB", bytes * 1e-9);
+}
+
+double total_wall(const std::vector<ExpectedStage>& stages) {
+  double sum = 0.0;
+  for (const ExpectedStage& s : stages) sum += s.wall;
+  return sum;
+}
+
+}  // namespace
+
+SphereFacts sphere_facts(const Case& c) {
+  const ParticleSpec& p = c.particles;
+  SphereFacts f;
+  f.mass_min = f.radius_min = std::numeric_limits<double>::infinity();
+  double radius_sum = 0.0;
+  const auto add = [&](double R, double rho, double times) {
+    const double m = sphere_mass(R, rho);
+    f.radius_min = std::min(f.radius_min, R), f.radius_max = std::max(f.radius_max, R);
+    f.mass_min = std::min(f.mass_min, m), f.mass_max = std::max(f.mass_max, m);
+    radius_sum += times * R, f.mass_total += times * m, f.solid_volume += times * sphere_mass(R, 1.0);
+  };
+  f.count = p.table ? static_cast<std::int64_t>(p.table->size()) : p.count;
+  if (p.table) {
+    for (std::size_t k = 0; k < p.table->size(); ++k) add(p.table->radius[k], p.table->density[k], 1.0);
+  } else if (p.sizes.kind == SizeDistribution::Kind::mono) {
+    add(p.sizes.radius, p.density, static_cast<double>(p.count));
+  } else {
+    // One at a time, as the fill draws them; a billion of them need no memory here.
+    RandomSource random(c.seed);
+    for (std::int64_t k = 0; k < p.count; ++k) add(draw_radius(p.sizes, random), p.density, 1.0);
+  }
+  f.radius_mean = radius_sum / static_cast<double>(f.count);
+  f.density = f.mass_total / f.solid_volume;
+  f.equal = f.radius_min == f.radius_max && f.mass_min == f.mass_max;
+  return f;
+}
+
+CheckReport check_report(const Case& c, int threads) {
+  refuse_unstable_step(c);
+  CheckReport report;
+  report.spheres = sphere_facts(c);
+  const SphereFacts& f = report.spheres;
+  const FirstStep first = first_step(c);
+  report.dt = first.dt, report.limits = first.limits, report.rule = first.rule;
+
+  const double mean_mass = f.mass_total / static_cast<double>(f.count);
+  if (c.gravity > 0.0) report.bond_number = std::fabs(c.particles.law.f0) / (mean_mass * c.gravity);
+  BedGuess bed;
+  const double area = c.box.width * c.box.depth;
+  if (area > 0.0 && !c.stages.empty()) {
+    const StageSpec& start = c.stages.front();
+    report.settled_porosity = start.kind == StageKind::fill && start.porosity ? *start.porosity
+                                                                              : free_porosity(report.bond_number.value_or(0.0), c.particles.law.k_adh > 0.0);
+    report.settled_height = bed.height = f.solid_volume / (area * (1.0 - *report.settled_porosity));
+    bed.porosity = *report.settled_porosity;
+    bed.rain_height = f.solid_volume / (area * rain_solid_fraction);
+  }
+  add_inertial_numbers(c, report);
+  report.memory = bytes_of_program + bytes_of_sphere * static_cast<double>(f.count);
+
+  // The made-up bed must not blow up, whatever step the user insists on.
+  const EngineSpeed speed = measure_speed(c, f.count, f.equal, std::min(report.dt, 0.2 * first.limits.dt_limit), threads);
+  report.scene = speed.scene, report.instruction_set = speed.instruction_set, report.threads = speed.threads;
+  report.why_scene = why_scene(c, f.equal), report.why_instruction_set = why_instruction_set();
+  report.particle_steps_per_second = speed.particle_steps_per_second;
+  report.stages = expected_stages(c, bed, f.count, report.dt, speed.particle_steps_per_second);
+  add_notes(c, report);
+  return report;
+}
+
+std::string check_text(const Case& c, const CheckReport& r) {
+  const SphereFacts& f = r.spheres;
+  std::string text;
+  const auto row = [&](const char* name, const std::string& value) { text += fmt::format("{:<16}{}\n", name, value); };
+  row("case", c.title.empty() ? c.file.string() : c.title);
+  row("spheres", f.radius_min == f.radius_max
+                     ? fmt::format("{}, radius {:g} mm", f.count, 1e3 * f.radius_min)
+                     : fmt::format("{}, radii {:.4g} to {:.4g} mm, mean {:.4g} mm", f.count, 1e3 * f.radius_min,
+                                   1e3 * f.radius_max, 1e3 * f.radius_mean));
+  row("mass", f.mass_min == f.mass_max
+                  ? fmt::format("{:.4g} kg together, {:.4g} kg each", f.mass_total, f.mass_min)
+                  : fmt::format("{:.4g} kg together, {:.4g} to {:.4g} kg each", f.mass_total, f.mass_min, f.mass_max));
+  row("solid volume", fmt::format("{:.4g} m3", f.solid_volume));
+  if (r.settled_height)
+    row("settled bed", fmt::format("about {:.3g} mm high, porosity {:.2f}", 1e3 * *r.settled_height, *r.settled_porosity));
+  row("time step", fmt::format("{:.4g} s, {}", r.dt, r.rule));
+  row("  dt_crit", fmt::format("{:.4g} s (springs alone; step is {:.0f} % of it)", r.limits.dt_crit, 100.0 * r.dt / r.limits.dt_crit));
+  row("  dt_limit", fmt::format("{:.4g} s (with dashpots; step is {:.0f} % of it)", r.limits.dt_limit, 100.0 * r.dt / r.limits.dt_limit));
+  text += fmt::format("{:<16}both of a dense bed of the smallest spheres{}\n", "",
+                      c.time.step ? "" : "; the run looks at the bed that there is");
+  if (r.bond_number) row("Bond number", fmt::format("{:.3g}  (|f0| over a sphere's weight)", *r.bond_number));
+  for (const InertialNumber& i : r.inertial)
+    row("inertial number", fmt::format("{:.1e}  {} at {:.3g} kPa ({})", i.value, i.stage, 1e-3 * i.stress, i.of));
+  row("memory", "about " + bytes_text(r.memory));
+  row("kernels", fmt::format("{}: {}", r.scene, r.why_scene));
+  row("", fmt::format("{}: {}", r.instruction_set, r.why_instruction_set));
+  row("speed here", fmt::format("{:.1f} M particle-steps/s on {} thread{}", 1e-6 * r.particle_steps_per_second, r.threads,
+                                r.threads == 1 ? "" : "s"));
+  text += fmt::format("{:<16}about {}\n", "expected time", duration_text(total_wall(r.stages)));
+  for (const ExpectedStage& s : r.stages)
+    text += fmt::format("  {:<22}{:>10} simulated {:>14}\n", s.name, fmt::format("{:.3g} s", s.simulated), duration_text(s.wall));
+  for (const std::string& note : r.notes) text += "note: " + note + '\n';
+  return text;
+}
+
+std::string check_json(const Case& c, const CheckReport& r) {
+  using Json = nlohmann::ordered_json;
+  const SphereFacts& f = r.spheres;
+  Json json = {{"kind", "check"}, {"title", c.title}};
+  json["particles"] = {{"count", f.count},           {"radius_min", f.radius_min}, {"radius_max", f.radius_max},
+                       {"radius_mean", f.radius_mean}, {"density", f.density},     {"mass_min", f.mass_min},
+                       {"mass_max", f.mass_max},     {"mass_total", f.mass_total}, {"solid_volume", f.solid_volume}};
+  json["time_step"] = {{"dt", r.dt}, {"dt_crit", r.limits.dt_crit}, {"dt_limit", r.limits.dt_limit}, {"rule", r.rule}};
+  if (r.settled_height) json["settled_bed"] = {{"height", *r.settled_height}, {"porosity", *r.settled_porosity}};
+  if (r.bond_number) json["bond_number"] = *r.bond_number;
+  json["inertial_numbers"] = Json::array();
+  for (const InertialNumber& i : r.inertial)
+    json["inertial_numbers"].push_back({{"stage", i.stage}, {"stress", i.stress}, {"of", i.of}, {"value", i.value}});
+  json["memory"] = r.memory;
+  json["kernels"] = {{"scene", r.scene},
+                     {"why_scene", r.why_scene},
+                     {"instruction_set", r.instruction_set},
+                     {"why_instruction_set", r.why_instruction_set}};
+  json["speed"] = {{"threads", r.threads}, {"particle_steps_per_second", r.particle_steps_per_second}};
+  json["stages"] = Json::array();
+  for (const ExpectedStage& s : r.stages)
+    json["stages"].push_back(
+        {{"name", s.name}, {"kind", to_string(s.kind)}, {"simulated_seconds", s.simulated}, {"wall_seconds", s.wall}});
+  json["wall_seconds"] = total_wall(r.stages);
+  json["notes"] = r.notes;
+  return json.dump(2) + "\n";
+}
+
+int check_command(const CheckCommand& command) {
+  const Case c = read_case(command.case_file, command.overrides);
+  const CheckReport report = check_report(c, command.threads.value_or(usable_cores()));
+  const std::string text = command.json ? check_json(c, report) : check_text(c, report);
+  std::fwrite(text.data(), 1, text.size(), stdout);
+  return exit_done;
+}
+
+}  // namespace platen
