@@ -13,8 +13,8 @@ namespace platen::bench {
 
 namespace {
 
-constexpr int bed_version = 1;          // of the recipe: part of the names in the cache
-constexpr double wanted_contacts = 6.25;  // Z
+constexpr int bed_version = 2;          // of the recipe: part of the names in the cache
+constexpr double wanted_contacts = 6.18;  // Z while settling; rest and load by the plate bring it to 6.2-6.3
 
 void say(const std::string& text) { fmt::print(stderr, "  bed: {}\n", text); }
 
@@ -79,7 +79,7 @@ Bed packed(std::int64_t particles) {
     bed = rested(bed, settling_law(), 150, &contacts);
     if (contacts < wanted_contacts) continue;
     bed = rested(at_rest(std::move(bed)), settling_law(), 600, &contacts);
-    if (contacts >= wanted_contacts - 0.03) break;
+    if (contacts >= wanted_contacts - 0.05) break;
   }
   bed = rested(at_rest(std::move(bed)), full_law(), 1000, &contacts);
   const double porosity_now = 1.0 - solid / (bed.width * bed.depth * bed.height);
@@ -168,7 +168,7 @@ Bed rain_bed(std::int64_t particles, const std::filesystem::path& cache) {
     bed.position = rain_positions(std::vector<double>(static_cast<std::size_t>(particles), bed.R), bed.width, bed.depth,
                                   true, 0.0, 0.25, random);
     for (std::size_t k = 0; k < bed.position.size(); ++k) {
-      bed.velocity.push_back((k % 3 == 2 ? -1.0 : 0.0) + 0.3 * random.normal());
+      bed.velocity.push_back((k % 3 == 2 ? -1.0 : 0.0) + 0.3 * (2.0 * random.uniform() - 1.0));
       if (k % 3 == 2) bed.height = std::max(bed.height, bed.position[k] + 2.0 * bed.R);
     }
     bed.spin.assign(bed.position.size(), 0.0);

@@ -3,7 +3,7 @@
 // Dense: spheres of R = 2.5 mm between two plates, periodic sides, about 6.25 contacts a sphere (Z): spheres grown to a
 // porosity of 0.4 (protocol/stages/grow.h), pressed together evenly in small steps with frictionless contacts until Z is
 // there, then left to rest with the full law. Larger beds are tiles of a smaller one, left to rest again.
-// Rain: a gas of solid fraction 0.25 that falls with 1 m/s, 0.3 m/s rms of random velocity per component.
+// Rain: a gas of solid fraction 0.25 that falls with 1 m/s, up to 0.3 m/s of random velocity (even) per component.
 #pragma once
 
 #include <cstdint>

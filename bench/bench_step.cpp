@@ -1,6 +1,7 @@
 // The whole time step through Simulation::advance, the way `platen run` takes: bench_step --help.
 #include <CLI/CLI.hpp>
 
+#include <cstdio>
 #include <exception>
 
 #include "bench/step_modes.h"
@@ -43,7 +44,6 @@ int main(int argc, char** argv) {
   CLI::App app("platen's time step: M particle-steps/s, with the state of the machine beside each figure");
   app.require_subcommand(1);
   options.beds = std::filesystem::temp_directory_path() / "platen-bench-beds";
-  std::vector<CLI::App*> modes;
   for (const auto& [name, what] : std::vector<std::pair<std::string, std::string>>{
            {"steps", "numbers of particles x scenes x instruction sets x threads"},
            {"pairs", "one thread against many, in interleaved pairs"},
@@ -53,9 +53,10 @@ int main(int argc, char** argv) {
            {"rain", "loose falling spheres, rebuilds included"},
            {"one", "blocks of one scene as one JSON line"},
            {"one-rain", "the same for rain"},
-           {"scenes", "lists the scenes"}}) {
-    modes.push_back(app.add_subcommand(name, what));
-    if (name != "scenes") common(*modes.back());
+           {"scenes", "lists the scenes"},
+           {"sets", "lists the instruction sets of this processor, the best last"}}) {
+    CLI::App* mode = app.add_subcommand(name, what);
+    if (name != "scenes" && name != "sets") common(*mode);
   }
   CLI11_PARSE(app, argc, argv);
   try {
@@ -71,6 +72,8 @@ int main(int argc, char** argv) {
     if (mode == "one-rain") one_block(options, true);
     if (mode == "scenes")
       for (const BenchScene& scene : bench_scenes()) std::printf("%s\n", scene.name.c_str());
+    if (mode == "sets")
+      for (const InstructionSet set : available_instruction_sets()) std::printf("%s\n", to_string(set));
   } catch (const std::exception& error) {
     std::fprintf(stderr, "bench_step: %s\n", error.what());
     return 2;

@@ -1,6 +1,8 @@
 #include "bench/harness.h"
 
 #include <fmt/format.h>
+#include <malloc.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -37,6 +39,14 @@ double median(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   const std::size_t n = values.size();
   return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
+}
+
+double resident_bytes() {
+  malloc_trim(0);
+  std::ifstream file("/proc/self/statm");
+  double total = 0.0, resident = 0.0;
+  if (!(file >> total >> resident)) return std::numeric_limits<double>::quiet_NaN();
+  return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
 std::string processor_name() {

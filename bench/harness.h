@@ -17,6 +17,7 @@ double seconds_now();             // monotonic [s]
 std::uint64_t stolen_ticks();     // all processors; 0 where the system does not say
 double seconds_of(const std::function<void()>& work);
 double median(std::vector<double> values);  // NaN without any
+double resident_bytes();           // of this process, after freed memory went back to the system; NaN where unknown
 std::string processor_name();     // model name of /proc/cpuinfo
 
 struct Variant {

@@ -34,8 +34,17 @@ BatchCopy::BatchCopy(const Batch& b)
 }
 
 PairBatch BatchCopy::pairs(const StateCopy& state) {
-  return {state.rows.data(), i.data(), j.data(), slot_j.data(), sp.data(), tx.data(), ty.data(), tz.data(),
-          k_t_last.empty() ? nullptr : k_t_last.data(), sum_i.data(), sum_j.data(), first, padded};
+  PairBatch b{};
+  b.rows = state.rows.data();
+  b.i = i.data(), b.j = j.data(), b.slot_j = slot_j.data();
+  b.sp = sp.data(), b.tx = tx.data(), b.ty = ty.data(), b.tz = tz.data();
+  b.k_t_last = k_t_last.empty() ? nullptr : k_t_last.data();
+  b.sum_i = sum_i.data(), b.sum_j = sum_j.data();
+  b.first = first, b.count = padded, b.end = first + count;
+  b.x = state.x.data(), b.y = state.y.data(), b.z = state.z.data();
+  b.vx = state.vx.data(), b.vy = state.vy.data(), b.vz = state.vz.data();
+  b.ux = state.ux.data(), b.uy = state.uy.data(), b.uz = state.uz.data();
+  return b;
 }
 
 MotionBatch BatchCopy::motion(StateCopy& s) {

@@ -51,7 +51,9 @@ __attribute__((target("avx512f"))) double fma_avx512(long n) {
 #pragma GCC unroll 12
     for (int k = 0; k < chains; ++k) a[k] = _mm512_fmadd_pd(a[k], b, c);
   for (int k = 1; k < chains; ++k) a[0] = _mm512_add_pd(a[0], a[k]);
-  return _mm256_cvtsd_f64(_mm512_castpd512_pd256(a[0]));
+  double out[8];
+  _mm512_storeu_pd(out, a[0]);
+  return out[0];
 }
 
 double read_scalar(const double* p, std::size_t n) {
@@ -79,7 +81,9 @@ __attribute__((target("avx512f"))) double read_avx512(const double* p, std::size
 #pragma GCC unroll 8
     for (std::size_t k = 0; k < 8; ++k) a[k] = _mm512_add_pd(a[k], _mm512_load_pd(p + i + 8 * k));
   for (int k = 1; k < 8; ++k) a[0] = _mm512_add_pd(a[0], a[k]);
-  return _mm256_cvtsd_f64(_mm512_castpd512_pd256(a[0]));
+  double out[8];
+  _mm512_storeu_pd(out, a[0]);
+  return out[0];
 }
 
 // Largest work per second of five parts of `seconds`; work() does `unit` of it.

@@ -44,8 +44,7 @@ nlohmann::json row_of(Simulation& sim, const BenchScene& scene, int threads) {
           {"kernels", built_scenes[static_cast<std::size_t>(sim.kernels().scene)].name},
           {"set", to_string(sim.kernels().instruction_set)}, {"threads", threads},
           {"Z", now.coordination_number}, {"contacts", static_cast<double>(now.contacts) / n},
-          {"listed", static_cast<double>(listed_pairs(sim)) / n}, {"batches", sim.counters().batches},
-          {"bytes", static_cast<double>(sim.counters().bytes) / n}};
+          {"listed", static_cast<double>(listed_pairs(sim)) / n}, {"batches", sim.counters().batches}};
 }
 
 void add_time(nlohmann::json& row, Simulation& sim, const Timing& timing, std::int64_t steps, int threads) {
@@ -83,21 +82,24 @@ void table_of_steps(const StepOptions& o) {
   Table table("Whole step, M particle-steps/s",
               {particles_column, scene_column, {"threads", "threads", 8, 0}, set_column, {"rate", "M/s"}, {"best", "best"},
                {"ns", "ns/contact", 12}, z_column, {"contacts", "c/particle", 11}, {"listed", "listed", 8}, {"rebuilds", "rebuilds"},
-               fma_column, l2_column, l3_column, state_column, hash_column});
+               {"memory", "B/particle", 11, 0}, fma_column, l2_column, l3_column, state_column, hash_column});
   for (const std::int64_t particles : either(o.particles, {5000, 35000})) {
     const Bed bed = dense_bed(particles, o.beds);
     for (const std::string& name : either(o.scenes, {"full"}))
       for (const InstructionSet set : sets_of(o))
         for (const int threads : either(o.threads, {1, 2})) {
           const BenchScene scene = bench_scene(name);
+          const double before = resident_bytes();
           const auto sim = make_simulation(bed, scene, engine_of(o, set, threads));
           sim->advance(o.warm);
+          const double memory = (resident_bytes() - before) / static_cast<double>(bed.size());
           const std::string hash = hash_of(*sim);
           const std::int64_t steps = steps_of(o, bed.size());
           const Timing timing = run_in_turn({stepping(name, *sim, steps)}, o.rounds).front();
           nlohmann::json row = row_of(*sim, scene, threads);
           add_time(row, *sim, timing, steps, threads);
           row["hash"] = hash;
+          row["memory"] = memory;
           add_reference(row, set);
           table.add(row);
         }
@@ -174,7 +176,7 @@ void table_of_features(const StepOptions& o) {
 bool table_of_scalar(const StepOptions& o) {
   Table table("platen on one thread against the plain scalar half-list step, blocks in turn",
               {particles_column, scene_column, set_column, {"rate", "platen M/s", 12}, {"scalar", "scalar M/s", 12},
-               {"ratio", "ratio", 8}, {"difference", "|dx|/R", 10, 14}, z_column, {"scalar_contacts", "scalar c", 10},
+               {"ratio", "ratio", 8}, {"agrees", "|dx|/R", 9, 0}, z_column, {"scalar_contacts", "scalar c", 10},
                {"scalar_listed", "listed", 8}, fma_column, l2_column, l3_column, state_column});
   if (!ScalarStep::available()) {
     fmt::print("  skipped: the yardstick is built for AVX2 and FMA, which this processor lacks\n");
@@ -201,6 +203,7 @@ bool table_of_scalar(const StepOptions& o) {
         row["scalar"] = rate(bed.size(), steps, timings[1].typical());
         row["ratio"] = median_ratio(timings[1], timings[0]);
         row["difference"] = difference;
+        row["agrees"] = fmt::format("{:.0e}", difference);
         row["scalar_contacts"] = static_cast<double>(scalar.contacts()) / n;
         row["scalar_listed"] = static_cast<double>(scalar.listed()) / n;
         row["scalar_rebuilds"] = scalar.rebuilds();

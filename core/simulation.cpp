@@ -264,7 +264,10 @@ void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, 
   std::memset(b.sum_j.data(), 0, b.sum_j.size() * sizeof(double));
   const PairBatch pairs{particles_.rows.data(), b.i.data(), b.j.data(), b.slot_j.data(), b.sp.data(), b.tx.data(),
                         b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum_i.data(),
-                        b.sum_j.data(), b.first, b.padded};
+                        b.sum_j.data(), b.first, b.padded, b.first + b.count,
+                        particles_.x.data(), particles_.y.data(), particles_.z.data(), particles_.vx.data(),
+                        particles_.vy.data(), particles_.vz.data(), particles_.ux.data(), particles_.uy.data(),
+                        particles_.uz.data()};
   b.pair_totals.contacts = 0;
   kernels_.contacts(pairs, law, b.pair_totals);
   b.out_of_range = b.out_of_range || b.pair_totals.out_of_range;

@@ -26,13 +26,34 @@ struct PairForces {
   typename I::Mask touching;
 };
 
+// Consecutive contacts share owners, and owners follow each other along the curve: eight contacts mostly have theirs
+// within eight places, which one load and one permutation per field bring.
+template <class I, SceneTraits scene>
+PLATEN_INLINE void fetch_owners(const PairBatch& b, std::int32_t k, typename I::Real (&x)[4], typename I::Real (&v)[4],
+                                typename I::Real (&u)[4]) {
+  if constexpr (I::picks && scene.equal_spheres) {
+    const std::int32_t base = b.i[k];
+    if (b.i[k + I::width - 1] - base < I::width && base + I::width <= b.end) {
+      const auto where = I::places(b.i + k, base);
+      x[0] = I::pick(b.x + base, where), x[1] = I::pick(b.y + base, where), x[2] = I::pick(b.z + base, where);
+      v[0] = I::pick(b.vx + base, where), v[1] = I::pick(b.vy + base, where), v[2] = I::pick(b.vz + base, where);
+      u[0] = I::pick(b.ux + base, where), u[1] = I::pick(b.uy + base, where), u[2] = I::pick(b.uz + base, where);
+      return;
+    }
+  }
+  I::fetch4(b.rows, b.i + k, 0, x);
+  I::fetch4(b.rows, b.i + k, 4, v);
+  I::fetch4(b.rows, b.i + k, 8, u);
+}
+
 template <class I, SceneTraits scene, bool exact>
 PLATEN_INLINE Pairs<I> fetch_pairs(const PairBatch& b, const LawConstants& c, std::int32_t k) {
   using Real = typename I::Real;
   Real xi[4], xj[4], vi[4], vj[4], ui[4], uj[4];
-  I::fetch4(b.rows, b.i + k, 0, xi), I::fetch4(b.rows, b.j + k, 0, xj);
-  I::fetch4(b.rows, b.i + k, 4, vi), I::fetch4(b.rows, b.j + k, 4, vj);
-  I::fetch4(b.rows, b.i + k, 8, ui), I::fetch4(b.rows, b.j + k, 8, uj);
+  I::fetch4(b.rows, b.j + k, 0, xj);
+  I::fetch4(b.rows, b.j + k, 4, vj);
+  I::fetch4(b.rows, b.j + k, 8, uj);
+  fetch_owners<I, scene>(b, k, xi, vi, ui);
   Pairs<I> p;
   // Nearest image: an odd function that changes no bit of a pair inside the box, or when the lengths are 0.
   Vec3<I> d = {xi[0] - xj[0], xi[1] - xj[1], xi[2] - xj[2]};

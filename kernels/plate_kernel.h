@@ -76,7 +76,8 @@ void plate_kernel(const PlateBatch& b, const Plane& plane, const PlateConstants&
     totals.energy[term_model] += energy_units(model);
     totals.work += energy_units(work);
     const Real size = ((I::abs(viscous) + I::abs(sliding)) + I::abs(model)) + I::abs(work);
-    const auto fine = I::both(dot(F, F) < force_bound2, size < energy_bound);
+    // A lever below 0 is an overlap above R: the centre is beyond the plane.
+    const auto fine = I::both(I::both(dot(F, F) < force_bound2, size < energy_bound), lever >= zero);
     totals.out_of_range = totals.out_of_range || I::any(I::negate(fine));
   }
 }

@@ -28,6 +28,7 @@ struct Scalar {
   using Real = double;
   using Mask = bool;
   static constexpr int width = 1;
+  static constexpr bool picks = false;  // has pick(): see Avx512
   static constexpr const char* name = "scalar";
 
   struct Record {
@@ -100,6 +101,7 @@ struct Avx2 {
   using Real = xsimd::batch<double, Arch>;
   using Mask = xsimd::batch_bool<double, Arch>;
   static constexpr int width = 4;
+  static constexpr bool picks = false;
   static constexpr const char* name = "avx2";
 
   struct Record {
@@ -203,6 +205,18 @@ struct Avx512 {
   using Mask = xsimd::batch_bool<double, Arch>;
   static constexpr int width = 8;
   static constexpr const char* name = "avx512";
+  static constexpr bool picks = true;
+  using Places = __m512i;
+
+  // places[lane] = index[lane] - base, for pick(); each must be in 0..7.
+  static PLATEN_INLINE Places places(const std::int32_t* index, std::int32_t base) {
+    const __m256i i = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(index));
+    return _mm512_cvtepi32_epi64(_mm256_sub_epi32(i, _mm256_set1_epi32(base)));
+  }
+  // p[places[lane]]: one load and one permutation where a gather would take eight loads.
+  static PLATEN_INLINE Real pick(const double* p, const Places& where) {
+    return _mm512_permutexvar_pd(where, _mm512_loadu_pd(p));
+  }
 
   struct Record {
     __m512d v;

@@ -71,6 +71,8 @@ struct PairBatch {
   double *sum_i, *sum_j;  // records; sum_i by i - first, sum_j by slot_j
   std::int32_t first;   // first particle of the batch
   std::int32_t count;
+  std::int32_t end;     // one past the batch's last particle
+  const double *x, *y, *z, *vx, *vy, *vz, *ux, *uy, *uz;  // the state itself, for the owner side
 };
 
 struct PairTotals {

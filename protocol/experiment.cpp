@@ -130,10 +130,20 @@ class Experiment {
     return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(((done + 1.0) * interval - sim_->time()) / dt - 1e-6)));
   }
 
+  // Limits are found anew every so many steps, and where the bed has become clearly denser or more loaded than it was:
+  // plates stiffen under load, and a fast plate loads a bed in less than limits_every steps.
+  bool limits_are_due(const Measures& m, bool regular) {
+    const double stress = std::max(m.stress_top, m.stress_bottom);
+    const auto contacts = static_cast<double>(m.contacts), few = 1.5 * sim_->particles();
+    const bool due = regular || stress > 1.3 * looked_stress_ + 100.0 || contacts > 1.1 * std::max(looked_contacts_, few);
+    if (regular) looked_stress_ = looked_contacts_ = 0.0;
+    if (due) looked_stress_ = std::max(looked_stress_, stress), looked_contacts_ = std::max(looked_contacts_, contacts);
+    return due;
+  }
+
   // The automatic step, or the watch over a fixed one.
-  void watch_time_step(Stand& stand) {
+  void watch_time_step(Stand& stand, const Measures& m) {
     const StepLimits limits = sim_->step_limits();
-    const Measures m = sim_->measure(false);
     if (c_.time.step) {
       const double ratio = sim_->time_step() / limits.dt_limit;
       if (ratio > 1.0 && !c_.time.allow_unstable)
@@ -197,9 +207,9 @@ class Experiment {
         if (!first_look || spec.kind == StageKind::fill)
           if (const auto reason = std::visit([&](auto& s) { return s.done(stand, look); }, stage)) current_.end_reason = *reason, over = true;
         guard(m);
-        if (on_grid && !first_look && sim_->step() % limits_grid == 0) {
-          watch_time_step(stand);
-          next_sample = sim_->step() + steps_to_sample();
+        if (on_grid && !first_look && limits_are_due(m, sim_->step() % limits_grid == 0)) {
+          watch_time_step(stand, m);
+          if (sim_->step() < next_sample) next_sample = sim_->step() + steps_to_sample();
         }
       }
       // After the time step may have changed.
@@ -300,6 +310,7 @@ class Experiment {
   StageResult current_;
   bool stage_open_ = false;
   std::optional<double> strain_zero_height_;
+  double looked_stress_ = 0.0, looked_contacts_ = 0.0;  // largest at looks at the limits since the last regular one
   double last_progress_ = 0.0;
   std::int64_t progress_step_ = 0;
 };

@@ -99,6 +99,11 @@ struct PressStage {
 };
 
 struct HoldStage {
+  double modulus = 0.0;           // of the bed as it answers at the moment [Pa]
+  double window_begin = 0.0;      // means over a few looks: that time [s], sums, and the means before
+  double stress_sum = 0.0, height_sum = 0.0;
+  int looks = 0;
+  double stress_before = std::numeric_limits<double>::quiet_NaN(), height_before = 0.0;
   void begin(Stand& stand);
   void update(Stand& stand, const Look& look);
   std::optional<std::string> done(Stand&, const Look&) { return std::nullopt; }

@@ -69,7 +69,7 @@ gravity = )" + gravity + "\n" + (sides.empty() ? "[plates]\ntop = false\nbottom 
 }
 
 // A finished run and what it left behind.
-struct Run {
+struct Trial {
   std::unique_ptr<TemporaryFolder> folder;
   Case c;
   RunOutcome outcome;
@@ -97,9 +97,9 @@ struct Run {
   std::filesystem::path path() const { return folder->path() / "run"; }
 };
 
-inline Run run_case(const std::string& text, const std::vector<std::string>& overrides = {}, const RunOptions& options = {},
+inline Trial run_case(const std::string& text, const std::vector<std::string>& overrides = {}, const RunOptions& options = {},
                     const std::string& table = "") {
-  Run run;
+  Trial run;
   run.folder = std::make_unique<TemporaryFolder>();
   if (!table.empty()) write_file(*run.folder / "spheres.csv", table);
   run.c = parse_case(text, "case.toml", run.folder->path(), overrides);

@@ -22,7 +22,7 @@ TEST(Fill, TheLidStandsAtTheBoxHeightOrJustAboveTheBed) {
 }
 
 TEST(Fill, RainGivesALooseBedWhoseSpheresHaveAllLanded) {
-  const Run run = run_case(small_bed + fill);
+  const Trial run = run_case(small_bed + fill);
   ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
   const Measures& m = run.stage("fill").last.measures;
   // To the highest sphere, so a rough surface counts as pores: far looser than the 0.36 of a dense random packing.
@@ -41,7 +41,7 @@ TEST(Fill, RainGivesALooseBedWhoseSpheresHaveAllLanded) {
 }
 
 TEST(Fill, WallsKeepTheSpheresInside) {
-  const Run run = run_case(small_bed + fill + quick_settle, {"box.sides=\"walls\"", "particles.count=80"});
+  const Trial run = run_case(small_bed + fill + quick_settle, {"box.sides=\"walls\"", "particles.count=80"});
   ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
   const auto x = ResultsFile(run.path() / "results.h5").doubles("/particles/position");
   for (std::size_t k = 0; k < x.rows(); ++k)
@@ -51,11 +51,11 @@ TEST(Fill, WallsKeepTheSpheresInside) {
     }
   const Measures& m = run.stage("settle").last.measures;
   EXPECT_NEAR(m.support_force, m.weight, 0.01 * m.weight) << "bottom plus friction of the walls";
-  EXPECT_LT(m.stress_bottom, m.weight / 4e-4) << "walls carry a part";
+  EXPECT_GT(std::fabs(m.stress_bottom * 4e-4 - m.weight), 1e-3 * m.weight) << "walls push up or down by friction";
 }
 
 TEST(Fill, GrowthReachesItsPorosityWithoutTime) {
-  const Run run = run_case(small_bed + "[[stage]]\nkind = \"fill\"\nmethod = \"grow\"\nporosity = 0.5\n");
+  const Trial run = run_case(small_bed + "[[stage]]\nkind = \"fill\"\nmethod = \"grow\"\nporosity = 0.5\n");
   ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
   EXPECT_EQ(run.stage("fill").last_step, 0);
   const double R = 0.0025, solid = 100 * 4.0 / 3.0 * std::numbers::pi * R * R * R, height = solid / (4e-4 * 0.5);
@@ -73,7 +73,7 @@ TEST(Fill, GrowthReachesItsPorosityWithoutTime) {
 }
 
 TEST(Fill, APorosityThatCannotBeHadIsSaid) {
-  const Run run = run_case(small_bed + "[[stage]]\nkind = \"fill\"\nmethod = \"grow\"\nporosity = 0.2\n");
+  const Trial run = run_case(small_bed + "[[stage]]\nkind = \"fill\"\nmethod = \"grow\"\nporosity = 0.2\n");
   EXPECT_EQ(run.outcome.exit_code, exit_numerical);
   EXPECT_NE(run.outcome.message.find("porosity of 0.2 cannot be reached"), std::string::npos) << run.outcome.message;
   EXPECT_TRUE(std::filesystem::exists(run.path() / "summary.json"));
@@ -84,7 +84,7 @@ TEST(Fill, SizesOfADistributionAndOtherExponents) {
   std::string text = small_bed + fill + quick_settle;
   text.replace(text.find("radius = \"2.5 mm\"\n"), std::string("radius = \"2.5 mm\"\n").size(), "");
   // k delta^1.5 like 5 kN/m at an overlap of 1 % of R.
-  const Run run = run_case(text, {sizes, "box.width=\"24 mm\"", "particles.law.exponent=1.5", "particles.law.k1=1e6", "particles.law.k2=5e6",
+  const Trial run = run_case(text, {sizes, "box.width=\"24 mm\"", "particles.law.exponent=1.5", "particles.law.k1=1e6", "particles.law.k2=5e6",
                                   "particles.law.k_adh=1e6", "time.step=\"auto\""});
   ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
   const auto R = ResultsFile(run.path() / "results.h5").doubles("/particles/radius");
@@ -113,8 +113,11 @@ TEST(Vibrate, TheBottomIsASineAndEndsExactlyAtZero) {
     // Half way the automatic step changes: the plate must not notice.
     if (bench.sim->step() - stand.first_step == 7 * 100) bench.sim->set_time_step(8e-6), bench.sim->set_time_step(1e-5);
     const double t = bench.sim->time() - begin, z = bench.sim->plane_position(plate_bottom);
-    if (t < 2.0 / 60.0 - 1e-9) EXPECT_NEAR(z, A * std::sin(w * t), 1e-12 * A + 1e-15) << t;
-    else EXPECT_EQ(z, 0.0) << "two whole periods, then rest";
+    if (t < 2.0 / 60.0 - 1e-9) {
+      EXPECT_NEAR(z, A * std::sin(w * t), 1e-12 * A + 1e-15) << t;
+    } else {
+      EXPECT_EQ(z, 0.0) << "two whole periods, then rest";
+    }
     highest = std::max(highest, z);
   }
   EXPECT_NEAR(highest, A, 1e-3 * A);
@@ -126,7 +129,7 @@ TEST(Vibrate, TheBottomIsASineAndEndsExactlyAtZero) {
 
 TEST(Vibrate, TakesItsDurationAndDensifies) {
   const std::string shake = "[[stage]]\nkind = \"vibrate\"\nfrequency = 60\namplitude = \"1.5 mm\"\nduration = \"0.3 s\"\n";
-  const Run run = run_case(small_bed + fill + shake + quick_settle, {"particles.law.k_adh=0", "particles.count=150"});
+  const Trial run = run_case(small_bed + fill + shake + quick_settle, {"particles.law.k_adh=0", "particles.count=150"});
   ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
   EXPECT_EQ(run.stage("vibrate").last_step - run.stage("vibrate").first_step, 30000);
   EXPECT_EQ(run.stage("vibrate").end_reason, "duration 0.3 s over");
@@ -139,7 +142,7 @@ TEST(Vibrate, TakesItsDurationAndDensifies) {
 
 // The criterion from the rows: at its end, and not a look earlier.
 TEST(Settle, EndsWithTheFirstWindowOfRest) {
-  const Run run = run_case(small_bed + fill + "[[stage]]\nkind = \"settle\"\nuntil = { kinetic_to_potential = 2e-5, window = \"30 ms\" }\n");
+  const Trial run = run_case(small_bed + fill + "[[stage]]\nkind = \"settle\"\nuntil = { kinetic_to_potential = 2e-5, window = \"30 ms\" }\n");
   ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
   const auto rows = run.rows("settle");
   ASSERT_GT(rows.size(), 90u);
@@ -167,7 +170,7 @@ TEST(Settle, EndsWithTheFirstWindowOfRest) {
 }
 
 TEST(Settle, ABedThatNeverRestsEndsWithExitCode6AndItsData) {
-  const Run run = run_case(small_bed + fill + "[[stage]]\nkind = \"settle\"\nmax_duration = \"20 ms\"\nuntil = { kinetic_to_potential = 1e-30 }\n" +
+  const Trial run = run_case(small_bed + fill + "[[stage]]\nkind = \"settle\"\nmax_duration = \"20 ms\"\nuntil = { kinetic_to_potential = 1e-30 }\n" +
                            time_passes("1 ms"));
   EXPECT_EQ(run.outcome.exit_code, exit_goal);
   EXPECT_NE(run.outcome.message.find("settle: goal not reached within max_duration"), std::string::npos) << run.outcome.message;
@@ -181,14 +184,16 @@ TEST(Settle, ABedThatNeverRestsEndsWithExitCode6AndItsData) {
 TEST(Settle, WithoutGravityTheEnergyOfTheStartIsTheMeasure) {
   // Two spheres that meet and stick [A45]; open sides, no plates, no box.
   const std::string table = "x,y,z,vx\n0,0,0,0.1\n0.0051,0,0,-0.1\n";
-  const Run run = run_case(table_case("[[stage]]\nkind = \"settle\"\nuntil = { window = \"10 ms\" }\n"), {}, {}, table);
+  const Trial run = run_case(table_case("[[stage]]\nkind = \"settle\"\nuntil = { window = \"10 ms\" }\n"), {}, {}, table);
   ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
   const auto rows = run.rows("settle");
   const double start = run.at(rows.front(), "kinetic_energy");
   EXPECT_NEAR(start, 4.0 / 3.0 * std::numbers::pi * std::pow(0.0025, 3) * 2000 * 0.01, 1e-9 * start);
   const double end = run.at(rows.back(), "time");
   for (const std::size_t r : rows)
-    if (run.at(r, "time") >= end - 0.01) EXPECT_LE(run.at(r, "kinetic_energy"), 1e-5 * start);
+    if (run.at(r, "time") >= end - 0.01) {
+      EXPECT_LE(run.at(r, "kinetic_energy"), 1e-5 * start);
+    }
   EXPECT_EQ(run.at(rows.back(), "contacts"), 1.0);
   EXPECT_TRUE(std::isnan(run.at(rows.back(), "kinetic_to_potential"))) << "no meaning without gravity";
   EXPECT_EQ(run.at(rows.back(), "stress_top"), 0.0);
@@ -196,7 +201,7 @@ TEST(Settle, WithoutGravityTheEnergyOfTheStartIsTheMeasure) {
 
 TEST(Settle, SpheresThatNeverMoveAreAtRest) {
   const std::string table = "x,y,z\n0,0,0\n0.01,0,0\n";
-  const Run run = run_case(table_case("[[stage]]\nkind = \"settle\"\nmax_duration = \"1 s\"\nuntil = { window = \"10 ms\" }\n"), {}, {}, table);
+  const Trial run = run_case(table_case("[[stage]]\nkind = \"settle\"\nmax_duration = \"1 s\"\nuntil = { window = \"10 ms\" }\n"), {}, {}, table);
   EXPECT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
   EXPECT_NEAR(run.stage("settle").time_end, 0.01, 2 * 3.2e-4);
 }
@@ -204,7 +209,7 @@ TEST(Settle, SpheresThatNeverMoveAreAtRest) {
 TEST(Settle, WithoutGravityABedThatOnlyThenStartsToMoveComesToRest) {
   // Overlapping spheres at rest push each other: there is no energy at the start to compare with.
   const std::string table = "x,y,z\n0,0,0\n0.0049,0,0\n0.0024,0.0043,0\n";
-  const Run run = run_case(table_case("[[stage]]\nkind = \"settle\"\nmax_duration = \"2 s\"\nuntil = { window = \"10 ms\" }\n"),
+  const Trial run = run_case(table_case("[[stage]]\nkind = \"settle\"\nmax_duration = \"2 s\"\nuntil = { window = \"10 ms\" }\n"),
                            {"particles.law.k_adh=5e3"}, {}, table);
   EXPECT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
 }
@@ -212,7 +217,7 @@ TEST(Settle, WithoutGravityABedThatOnlyThenStartsToMoveComesToRest) {
 TEST(RunStage, TakesExactlyItsTime) {
   // A free fall: the scheme is exact for a constant acceleration.
   const std::string table = "x,y,z,vx,vz\n0,0,1,0.2,0.3\n";
-  const Run run = run_case(table_case(time_passes("5 ms") + time_passes("20 ms"), "", "9.81"), {}, {}, table);
+  const Trial run = run_case(table_case(time_passes("5 ms") + time_passes("20 ms"), "", "9.81"), {}, {}, table);
   ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
   EXPECT_EQ(run.stage("run").last_step, 500);
   EXPECT_EQ(run.stage("run-2").last_step, 2500);
@@ -226,16 +231,15 @@ TEST(RunStage, TakesExactlyItsTime) {
 
 TEST(RunStage, HalfAStepMoreEndsAtTheSameStepHoweverOftenRowsAreWritten) {
   const std::string table = "x,y,z\n0,0,1\n";
-  for (const char* duration : {"1 ms", "1.008 ms", "0.5 ms"}) {  // 62.5, 63, 31.25 steps of 16 us
+  for (const auto& [duration, steps] : {std::pair("1 ms", 62.5), std::pair("1.008 ms", 63.0), std::pair("0.5 ms", 31.25)}) {  // of 16 us
     std::vector<std::int64_t> last;
     for (const char* series : {"1 s", "16 us", "0.2 ms", "31 us"}) {
-      const Run run = run_case(table_case(time_passes(duration), "", "9.81"),
+      const Trial run = run_case(table_case(time_passes(duration), "", "9.81"),
                                {"time.step=\"16 us\"", std::string("output.series=\"") + series + "\""}, {}, table);
       ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
       last.push_back(run.stage("run").last_step);
     }
-    EXPECT_LE(std::fabs(static_cast<double>(last[0]) * 16e-6 - run_case(table_case(time_passes(duration)), {}, {}, table).c.stages[0].duration.value()),
-              0.5 * 16e-6 * (1.0 + 1e-9));
+    EXPECT_LE(std::fabs(static_cast<double>(last[0]) - steps), 0.5);
     for (const std::int64_t step : last) EXPECT_EQ(step, last[0]) << duration;
   }
 }

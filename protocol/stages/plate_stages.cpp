@@ -63,21 +63,46 @@ void PressStage::end(Stand& stand, StageResult&) {
 
 // -------------------------------------------------------------------------------------------------------------- hold
 
+namespace {
+
+// The stiffest that a bed can be: every contact on the k2 branch, at an overlap of 5 % of R.
+double stiffest_bed(const PairLaw& law, double R) {
+  const double k2 = law.exponent == 1.0 ? law.k2 : law.exponent * law.k2 * std::pow(0.05 * R, law.exponent - 1.0);
+  return k2 / (4.0 * R);
+}
+
+constexpr double servo_time = 0.02;     // [s] in which an error falls to 1/e
+constexpr double servo_window = 5e-3;   // [s] over which the bed's answer is averaged
+constexpr double servo_speed = 0.05;    // [m/s] at most
+
+}  // namespace
+
 void HoldStage::begin(Stand& stand) {
+  modulus = stiffest_bed(stand.c.particles.law, stand.sim.largest_radius());
+  window_begin = stand.first_time;
   PlaneMotion top;
   top.origin = stand.sim.plane_position(plate_top);
   stand.sim.set_plane(plate_top, top);
 }
 
-// The plate moves by what a bed of modulus k2/(4 R) needs to reach the stress, within 20 ms, at 50 mm/s at most. A real
-// bed is softer or stiffer by a small factor, which only makes the approach slower or quicker.
+// The plate moves by what the bed needs to reach the stress within servo_time. How stiff the bed is, it shows itself: far
+// stiffer when it is relieved than when it is pressed on. Taken as stiff at first, so that the plate starts gently.
 void HoldStage::update(Stand& stand, const Look& look) {
   const PairLaw& law = stand.c.particles.law;
-  const double R = stand.sim.largest_radius();
-  const double k2 = law.exponent == 1.0 ? law.k2 : law.exponent * law.k2 * std::pow(0.05 * R, law.exponent - 1.0);
-  const double modulus = k2 / (4.0 * R);
+  stress_sum += look.m.stress_top, height_sum += look.m.height, ++looks;
+  if (look.m.time >= window_begin + servo_window) {
+    const double stress = stress_sum / looks, height = height_sum / looks;
+    const double more = stress - stress_before, strain = (height_before - height) / height;
+    // Smaller answers are noise.
+    if (std::fabs(more) > 1e-3 * stand.spec.stress && strain != 0.0) {
+      const double highest = stiffest_bed(law, stand.sim.largest_radius()), lowest = 0.1 * highest * law.k1 / law.k2;
+      modulus = std::sqrt(modulus * std::clamp(more / strain, lowest, highest));
+    }
+    stress_before = stress, height_before = height;
+    stress_sum = height_sum = 0.0, looks = 0, window_begin = look.m.time;
+  }
   const double error = stand.spec.stress - look.m.stress_top;
-  const double velocity = std::clamp(-error * look.m.height / modulus / 0.02, -0.05, 0.05);
+  const double velocity = std::clamp(-error * look.m.height / modulus / servo_time, -servo_speed, servo_speed);
   stand.sim.set_plane_velocity(plate_top, velocity);
 }
 

@@ -1,0 +1,207 @@
+#include "protocol/study/plan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+#include "core/simulation.h"
+#include "protocol/case_document.h"
+#include "protocol/case_reader.h"
+#include "protocol/experiment.h"
+
+namespace platen {
+namespace {
+
+// A text as part of a folder's name.
+std::string path_part(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '-' || c == '+' || c == '=' || c == '_';
+    if (plain) out += c;
+  }
+  return out;
+}
+
+std::string last_key(const std::string& path) { return path.substr(path.rfind('.') + 1); }
+
+std::string plain_value(std::string toml) {
+  std::erase(toml, '"');
+  return toml;
+}
+
+std::string radius_text(double R) { return fmt::format("{:g} mm", 1e3 * R); }
+
+class Planner {
+ public:
+  explicit Planner(StudyPlan& plan) : plan_(plan) {}
+
+  void add_part(const Study& study) {
+    PlannedPart part;
+    part.study = &study;
+    try {
+      part.base = read_case(study.base, study.set);
+    } catch (const CaseError& error) {
+      problem(study.base_where, "study.base", std::string("the base case is wrong:\n") + error.what());
+      return;
+    }
+    const SizeDistribution& sizes = part.base.particles.sizes;
+    if (study.reference_radius) part.reference_radius = *study.reference_radius;
+    else if (sizes.kind == SizeDistribution::Kind::mono && sizes.radius > 0.0) part.reference_radius = sizes.radius;
+    else {
+      problem(study.base_where, "study.reference_radius", "is missing; allowed: the radius that the base case of a size "
+              "distribution or of a particle file stands for");
+      return;
+    }
+    if (study.reference_radius && sizes.kind == SizeDistribution::Kind::mono && sizes.radius != *study.reference_radius) {
+      problem(study.base_where, "study.reference_radius",
+              fmt::format("is {}, but the base case has spheres of {}; allowed: leave it out, or the same",
+                          radius_text(*study.reference_radius), radius_text(sizes.radius)));
+      return;
+    }
+    for (const CurveSpec& spec : study.curves) add_block(part, spec);
+    find_references(part);
+    plan_.parts.push_back(std::move(part));
+  }
+
+  void finish() const {
+    if (!problems_.empty()) throw CaseError(problems_.text());
+  }
+
+ private:
+  void problem(const Position& where, const std::string& key, const std::string& what) { problems_.add(where, key, what); }
+
+  void add_block(PlannedPart& part, const CurveSpec& spec) {
+    const std::vector<double> radii = spec.radii.empty() ? std::vector{part.reference_radius} : spec.radii;
+    std::vector<std::map<std::string, std::string>> variants(1);
+    for (const VariedKey& key : spec.vary) {
+      std::vector<std::map<std::string, std::string>> more;
+      for (const auto& variant : variants)
+        for (const std::string& value : key.values) {
+          more.push_back(variant);
+          more.back()[key.key] = value;
+        }
+      variants = std::move(more);
+    }
+    for (const double R : radii)
+      for (const double a : spec.stiffness)
+        for (const double b : spec.adhesion)
+          for (const double c : spec.time_step)
+            for (const auto& variant : variants) {
+              PlannedCurve curve;
+              curve.block = spec.name;
+              curve.radius = R;
+              curve.powers = {a, b, spec.dashpots, c};
+              curve.varied = variant;
+              curve.label = spec.name;
+              if (radii.size() > 1) curve.label += " R=" + radius_text(R);
+              if (spec.stiffness.size() > 1) curve.label += fmt::format(" a={:g}", a);
+              if (spec.adhesion.size() > 1) curve.label += fmt::format(" b={:g}", b);
+              if (spec.time_step.size() > 1) curve.label += fmt::format(" dt~R^{:g}", c);
+              for (const VariedKey& key : spec.vary)
+                if (key.values.size() > 1) curve.label += fmt::format(" {}={}", last_key(key.key), plain_value(variant.at(key.key)));
+              add_jobs(part, spec, curve);
+              part.curves.push_back(std::move(curve));
+            }
+  }
+
+  void add_jobs(PlannedPart& part, const CurveSpec& spec, PlannedCurve& curve) {
+    const Study& study = *part.study;
+    std::vector<std::string> changes = study.set;
+    changes.insert(changes.end(), spec.set.begin(), spec.set.end());
+    for (const auto& [key, value] : curve.varied) changes.push_back(key + "=" + value);
+    for (const std::uint64_t seed : study.seeds) try {
+        const double lambda = curve.radius / part.reference_radius;
+        std::vector<std::string> all = changes;
+        const Case unscaled = read_case(study.base, all);
+        for (std::string& change : scaling_overrides(unscaled, curve.powers, lambda)) all.push_back(std::move(change));
+        all.push_back("case.seed=" + std::to_string(seed));
+        if (!unscaled.particles.file.empty())  // the case moves to another folder
+          all.push_back("particles.file=\"" + std::filesystem::absolute(study.base.parent_path() / unscaled.particles.file).string() + "\"");
+        Case c = read_case(study.base, all);
+        // Without the comments on overrides: how a case came about must not make it another run.
+        const std::string text = to_toml(parse_document(c.text, "case.toml"));
+        c = parse_case(text, study.base.string(), {}, {});
+        refuse_unstable_step(c);
+        for (int repeat = 1; repeat <= study.repeats; ++repeat) {
+          curve.seeds.push_back(seed);
+          curve.jobs.push_back(job(part, spec, curve, c, seed, study.timed ? repeat : 0));
+        }
+      } catch (const CaseError& error) {
+        problem(spec.where, "curve", fmt::format("\"{}\" is not a possible case:\n{}", curve.label, error.what()));
+        return;  // the other seeds would say the same
+      } catch (const std::domain_error& error) {
+        problem(spec.where, "curve", fmt::format("\"{}\" is not a possible case: {}", curve.label, error.what()));
+        return;
+      }
+  }
+
+  // The job of this case; a new one only if no other curve needs it. repeat 0: not timed.
+  std::size_t job(const PlannedPart& part, const CurveSpec& spec, const PlannedCurve& curve, const Case& c,
+                  std::uint64_t seed, int repeat) {
+    const Study& study = *part.study;
+    const std::string identity = c.text + fmt::format("\n#{} {}", repeat, repeat > 0 ? study.name + study.base.string() : "");
+    if (const auto known = known_.find(identity); known != known_.end()) return known->second;
+    std::string name = (repeat > 0 ? "timed-" : "") + path_part(study.base.stem().string()) + fmt::format("-R{:g}mm", 1e3 * curve.radius);
+    const bool scaled = curve.radius != part.reference_radius;
+    if (scaled) name += fmt::format("-a{:g}-b{:g}", curve.powers.stiffness, curve.powers.adhesion);
+    if (scaled && curve.powers.time_step != 0.0) name += fmt::format("-dt{:g}", curve.powers.time_step);
+    for (const auto& [key, value] : curve.varied) name += "-" + path_part(last_key(key) + "=" + plain_value(value));
+    for (const std::string& text : spec.set) name += "-" + path_part(last_key(text.substr(0, text.find('='))) + "=" + plain_value(text.substr(text.find('=') + 1)));
+    name += fmt::format("-s{}", seed);
+    if (repeat > 0) name += fmt::format("-t{}", repeat);
+    std::string unique = name;
+    for (int k = 2; !names_.insert(unique).second; ++k) unique = fmt::format("{}-{}", name, k);
+    Job added;
+    added.name = unique;
+    added.c = c;
+    const double dt = c.time.step ? *c.time.step : first_step(c).dt;
+    const double spheres = static_cast<double>(c.particles.table ? static_cast<std::int64_t>(c.particles.table->size()) : c.particles.count);
+    added.weight = spheres / dt;
+    added.timed = repeat > 0;
+    added.threads = study.threads;
+    plan_.jobs.push_back(std::move(added));
+    return known_[identity] = plan_.jobs.size() - 1;
+  }
+
+  // The member of the reference's block that agrees in every varied key that both have.
+  void find_references(PlannedPart& part) {
+    for (PlannedCurve& curve : part.curves) {
+      const auto spec = std::find_if(part.study->curves.begin(), part.study->curves.end(),
+                                     [&](const CurveSpec& s) { return s.name == curve.block; });
+      const std::string& wanted = spec->against.empty() ? part.study->curves.front().name : spec->against;
+      std::vector<std::size_t> found;
+      for (std::size_t k = 0; k < part.curves.size(); ++k) {
+        const PlannedCurve& other = part.curves[k];
+        const bool agrees = std::all_of(other.varied.begin(), other.varied.end(), [&](const auto& entry) {
+          const auto own = curve.varied.find(entry.first);
+          return own == curve.varied.end() || own->second == entry.second;
+        });
+        if (other.block == wanted && agrees) found.push_back(k);
+      }
+      if (found.empty()) continue;  // the block itself was wrong and has been reported
+      curve.reference = found.front();
+    }
+  }
+
+  StudyPlan& plan_;
+  Problems problems_;
+  std::map<std::string, std::size_t> known_;
+  std::set<std::string> names_;
+};
+
+}  // namespace
+
+StudyPlan make_plan(const Study& study) {
+  StudyPlan plan;
+  plan.study = &study;
+  Planner planner(plan);
+  if (study.parts.empty()) planner.add_part(study);
+  for (const Study& part : study.parts) planner.add_part(part);
+  planner.finish();
+  return plan;
+}
+
+}  // namespace platen
