@@ -48,10 +48,13 @@ inline const std::string quick_settle =
 inline const std::string press =
     "[[stage]]\nkind = \"compress\"\nspeed = \"50 mm/s\"\nstart_gap = \"0.1 mm\"\nuntil = { stress = \"20 kPa\" }\n";
 inline const std::string unload = "[[stage]]\nkind = \"unload\"\nspeed = \"50 mm/s\"\n";
-inline std::string time_passes(const std::string& duration) { return "[[stage]]\nkind = \"run\"\nduration = \"" + duration + "\"\n"; }
+inline std::string time_passes(const std::string& duration) {
+  return "[[stage]]\nkind = \"run\"\nduration = \"" + duration + "\"\n";
+}
 
 // Spheres from a table instead of a fill; no plates, no sides, no gravity unless said otherwise.
-inline std::string table_case(const std::string& more, const std::string& sides = "", const std::string& gravity = "0") {
+inline std::string table_case(const std::string& more, const std::string& sides = "",
+                              const std::string& gravity = "0") {
   return R"([case]
 title = "table"
 [particles]
@@ -64,7 +67,8 @@ k2 = "25 kN/m"
 restitution = 0.4
 friction = 0.5
 [environment]
-gravity = )" + gravity + "\n" + (sides.empty() ? "[plates]\ntop = false\nbottom = false\n" : sides) +
+gravity = )" +
+         gravity + "\n" + (sides.empty() ? "[plates]\ntop = false\nbottom = false\n" : sides) +
          "[time]\nstep = \"10 us\"\n[output]\nseries = \"0.32 ms\"\n" + more;
 }
 
@@ -97,8 +101,8 @@ struct Trial {
   std::filesystem::path path() const { return folder->path() / "run"; }
 };
 
-inline Trial run_case(const std::string& text, const std::vector<std::string>& overrides = {}, const RunOptions& options = {},
-                    const std::string& table = "") {
+inline Trial run_case(const std::string& text, const std::vector<std::string>& overrides = {},
+                      const RunOptions& options = {}, const std::string& table = "") {
   Trial run;
   run.folder = std::make_unique<TemporaryFolder>();
   if (!table.empty()) write_file(*run.folder / "spheres.csv", table);
@@ -116,12 +120,15 @@ struct Bench {
   std::unique_ptr<Simulation> sim;
   std::optional<double> strain_zero_height;
 
-  explicit Bench(const std::string& text, const std::vector<std::string>& overrides = {}, const std::string& table = "") {
+  explicit Bench(const std::string& text, const std::vector<std::string>& overrides = {},
+                 const std::string& table = "") {
     if (!table.empty()) write_file(folder / "spheres.csv", table);
     c = parse_case(text, "case.toml", folder.path(), overrides);
     sim = make_simulation(c, 1, false);
   }
-  Stand stand(std::size_t k) { return {*sim, c, c.stages[k], sim->step(), sim->time(), strain_zero_height, sim->step(), 0.0}; }
+  Stand stand(std::size_t k) {
+    return {*sim, c, c.stages[k], sim->step(), sim->time(), strain_zero_height, sim->step(), 0.0};
+  }
 
   // A stage from begin to end; most steps that it may take.
   void drive(std::size_t k, std::int64_t most = 400000) {

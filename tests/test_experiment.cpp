@@ -19,21 +19,23 @@ nlohmann::json summary(const Trial& run) { return nlohmann::json::parse(read_fil
 
 TEST(Series, RowsStandWhereTheyMust) {
   for (const char* interval : {"1 ms", "0.33 ms", "7 us"}) {
-    const Trial run = run_case(small_bed + fill + press, {"particles.count=30", std::string("output.series=\"") + interval + "\""});
+    const Trial run =
+        run_case(small_bed + fill + press, {"particles.count=30", std::string("output.series=\"") + interval + "\""});
     ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
     const double every = run.c.output.series, dt = 1e-5;
     for (const StageResult& stage : run.outcome.stages) {
       const auto rows = run.rows(stage.name);
       std::vector<std::int64_t> expected{stage.first_step};
       // First steps at or after multiples of the interval; a multiple is met when it is missed by rounding alone.
-      for (auto k = static_cast<std::int64_t>(static_cast<double>(stage.first_step) * dt / every); ; ++k) {
+      for (auto k = static_cast<std::int64_t>(static_cast<double>(stage.first_step) * dt / every);; ++k) {
         const auto step = static_cast<std::int64_t>(std::ceil(static_cast<double>(k) * every / dt - 1e-6));
         if (step >= stage.last_step) break;
         if (step > expected.back()) expected.push_back(step);
       }
       expected.push_back(stage.last_step);
       ASSERT_EQ(rows.size(), expected.size()) << stage.name << " " << interval;
-      for (std::size_t k = 0; k < rows.size(); ++k) EXPECT_EQ(static_cast<std::int64_t>(run.at(rows[k], "step")), expected[k]);
+      for (std::size_t k = 0; k < rows.size(); ++k)
+        EXPECT_EQ(static_cast<std::int64_t>(run.at(rows[k], "step")), expected[k]);
     }
   }
 }
@@ -89,7 +91,8 @@ TEST(Bits, ThreadsDoNotChangeThem) {
         for (const int cell : {i, j, k}) table += std::to_string((cell + 0.5 + random.between(-0.02, 0.02)) * a) + ",";
         table += std::to_string(random.between(-0.2, 0.2)) + "," + std::to_string(random.between(-0.2, 0.2)) + ",0\n";
       }
-  const std::string box = "[box]\nwidth = " + std::to_string(13 * a) + "\ndepth = " + std::to_string(13 * a) + "\nheight = " + std::to_string(20 * a) + "\n";
+  const std::string box = "[box]\nwidth = " + std::to_string(13 * a) + "\ndepth = " + std::to_string(13 * a) +
+                          "\nheight = " + std::to_string(20 * a) + "\n";
   const std::string stages = "[[stage]]\nkind = \"compress\"\nspeed = 0.05\nuntil = { duration = \"3 ms\" }\n" +
                              std::string("[[stage]]\nkind = \"release\"\nmax_duration = \"2 ms\"\n");
   std::vector<std::uint64_t> hashes;
@@ -146,7 +149,8 @@ TEST(Exit, WallTimeStops) {
 // Two spheres shot at each other. At 30 m/s against each other their energy is twice that of an overlap of R.
 TEST(Exit, ADeepOverlapStopsTheRunAndNamesTheSpheres) {
   const std::string table = "id,x,y,z,vx\n7,0,0,0,20\n12,0.02,0,0,-20\n40,0.5,0,0,0\n";
-  const Trial run = run_case(table_case(time_passes("0.1 ms") + time_passes("50 ms")), {"particles.law.restitution=1.0", "time.step=\"1 us\""}, {}, table);
+  const Trial run = run_case(table_case(time_passes("0.1 ms") + time_passes("50 ms")),
+                             {"particles.law.restitution=1.0", "time.step=\"1 us\""}, {}, table);
   EXPECT_EQ(run.outcome.exit_code, exit_numerical);
   const std::string& said = run.outcome.message;
   EXPECT_NE(said.find("spheres 7 at"), std::string::npos) << said;
@@ -169,7 +173,9 @@ TEST(Exit, ADeepOverlapStopsTheRunAndNamesTheSpheres) {
 
 TEST(Exit, ASphereThroughAPlateStopsTheRunAndIsNamed) {
   const std::string table = "id,x,y,z,vz\n3,0.01,0.01,0.02,-300\n";
-  const Trial run = run_case(table_case("[box]\nwidth = 0.02\ndepth = 0.02\nheight = 0.04\n" + time_passes("50 ms"), "[plates]\ntop = false\n"), {"time.step=\"1 us\""}, {}, table);
+  const Trial run = run_case(table_case("[box]\nwidth = 0.02\ndepth = 0.02\nheight = 0.04\n" + time_passes("50 ms"),
+                                        "[plates]\ntop = false\n"),
+                             {"time.step=\"1 us\""}, {}, table);
   EXPECT_EQ(run.outcome.exit_code, exit_numerical);
   EXPECT_NE(run.outcome.message.find("sphere 3 at"), std::string::npos) << run.outcome.message;
   EXPECT_NE(run.outcome.message.find("is in or beyond a plate or wall"), std::string::npos) << run.outcome.message;
@@ -208,7 +214,8 @@ StepLimits limits_of(const Trial& run, const std::string& stage, double top) {
 TEST(TimeStep, AutoStaysBelowItsLimitsAndChangesOnTheGrid) {
   for (const char* safety : {"0.2", "1.0"}) {
     const Trial run = run_case(small_bed + fill + time_passes("50 ms") + press + time_passes("100 ms"),
-                               {"time.step=\"auto\"", std::string("time.safety=") + safety, "output.series=\"1 us\"", "particles.count=40", "stage.compress.until={ stress = \"40 kPa\" }"});
+                               {"time.step=\"auto\"", std::string("time.safety=") + safety, "output.series=\"1 us\"",
+                                "particles.count=40", "stage.compress.until={ stress = \"40 kPa\" }"});
     ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
     double dt = 0.0;
     int changes = 0;
@@ -229,7 +236,8 @@ TEST(TimeStep, AutoStaysBelowItsLimitsAndChangesOnTheGrid) {
     for (const char* stage : {"run", "compress", "run-2"}) {
       const auto rows = run.rows(stage);
       const std::size_t last = rows.back();
-      const double used = (run.at(last, "time") - run.at(last - 1, "time")) / (run.at(last, "step") - run.at(last - 1, "step"));
+      const double used =
+          (run.at(last, "time") - run.at(last - 1, "time")) / (run.at(last, "step") - run.at(last - 1, "step"));
       const double top = run.at(last, "stress_top") > 0.0 ? run.at(last, "height") : 1.0;
       const StepLimits limits = limits_of(run, stage, top);
       // Eigenvalues are good to 1 %; a load that grows by less than 1.3 is not looked at: (1.3)^(1/6) in the step.
@@ -264,10 +272,12 @@ TEST(TimeStep, AFixedStepThatCrossesTheLimitInMidRun) {
   const Trial run = run_case(small_bed + fill + press, overrides);
   ASSERT_NO_THROW(refuse_unstable_step(run.c));
   EXPECT_EQ(run.outcome.exit_code, exit_numerical);
-  EXPECT_NE(run.outcome.message.find("the time step 2.1e-05 s is above dt_limit"), std::string::npos) << run.outcome.message;
+  EXPECT_NE(run.outcome.message.find("the time step 2.1e-05 s is above dt_limit"), std::string::npos)
+      << run.outcome.message;
   EXPECT_NE(run.outcome.message.find("at step "), std::string::npos);
   const StageResult& failed = run.stage("compress");
-  EXPECT_EQ(std::count(failed.warnings.begin(), failed.warnings.end(), "time step above 0.9 dt_limit"), 1) << "at 0.9 of the limit, once";
+  EXPECT_EQ(std::count(failed.warnings.begin(), failed.warnings.end(), "time step above 0.9 dt_limit"), 1)
+      << "at 0.9 of the limit, once";
   EXPECT_EQ(failed.end_reason, "failed");
 
   std::vector<std::string> at_own_risk = overrides;

@@ -7,9 +7,10 @@
 namespace platen::test {
 namespace {
 
-const char* const dissipations[] = {"plastic_dissipation", "viscous_dissipation", "sliding_dissipation", "rolling_dissipation"};
-const char* const other_lines[] = {"elastic_energy", "adhesion_energy", "tangential_energy", "plate_energy", "plate_model_work",
-                                   "plate_work", "inserted_energy", "removed_energy"};
+const char* const dissipations[] = {"plastic_dissipation", "viscous_dissipation", "sliding_dissipation",
+                                    "rolling_dissipation"};
+const char* const other_lines[] = {"elastic_energy",   "adhesion_energy", "tangential_energy", "plate_energy",
+                                   "plate_model_work", "plate_work",      "inserted_energy",   "removed_energy"};
 
 double lost(const Trial& run, std::size_t row) {
   double sum = 0.0;
@@ -29,15 +30,17 @@ TEST(Ledger, ClosesAtEveryStageEndOfTheQuickCase) {
   ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
   ASSERT_EQ(run.outcome.stages.size(), 6u);
   for (const StageResult& stage : run.outcome.stages)
-    EXPECT_LT(std::fabs(stage.last.measures.energy_residual), 0.01 * stage.last.measures.ledger.dissipated()) << stage.name;
+    EXPECT_LT(std::fabs(stage.last.measures.energy_residual), 0.01 * stage.last.measures.ledger.dissipated())
+        << stage.name;
 }
 
 TEST(Ledger, TheResidualIsTheSumOfItsLines) {
   const Trial& run = quick();
   for (std::size_t r = 0; r < run.series.rows.size(); ++r) {
     const double sum = run.at(r, "kinetic_energy") + run.at(r, "potential_energy") + run.at(r, "elastic_energy") +
-                       run.at(r, "adhesion_energy") + run.at(r, "tangential_energy") + run.at(r, "plate_energy") + lost(run, r) -
-                       run.at(r, "plate_model_work") - run.at(r, "plate_work") - run.at(r, "inserted_energy") + run.at(r, "removed_energy");
+                       run.at(r, "adhesion_energy") + run.at(r, "tangential_energy") + run.at(r, "plate_energy") +
+                       lost(run, r) - run.at(r, "plate_model_work") - run.at(r, "plate_work") -
+                       run.at(r, "inserted_energy") + run.at(r, "removed_energy");
     // Terms of some 0.01 J, a few roundings each.
     EXPECT_NEAR(run.at(r, "energy_residual"), sum, 1e-15) << r;
   }
@@ -70,14 +73,16 @@ TEST(Ledger, LinesMeanWhatTheySay) {
   const auto rows = run.rows("compress");
   double work = 0.0;
   for (std::size_t k = 1; k < rows.size(); ++k)
-    work += 0.5 * (run.at(rows[k], "stress_top") + run.at(rows[k - 1], "stress_top")) * 9e-4 * 0.05 * (run.at(rows[k], "time") - run.at(rows[k - 1], "time"));
+    work += 0.5 * (run.at(rows[k], "stress_top") + run.at(rows[k - 1], "stress_top")) * 9e-4 * 0.05 *
+            (run.at(rows[k], "time") - run.at(rows[k - 1], "time"));
   EXPECT_NEAR(run.at(rows.back(), "plate_work"), work, 0.02 * work);
 }
 
 TEST(Ledger, WithoutItTheColumnsAreEmptyAndTheBedIsTheSame) {
   std::vector<std::uint64_t> hashes;
   for (const char* energy : {"true", "false"}) {
-    const Trial run = run_case(small_bed + fill + press, {std::string("output.energy=") + energy, "particles.count=60"});
+    const Trial run =
+        run_case(small_bed + fill + press, {std::string("output.energy=") + energy, "particles.count=60"});
     ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
     hashes.push_back(run.outcome.state_hash);
     const bool kept = std::string(energy) == "true";
@@ -99,13 +104,16 @@ TEST(Ledger, TheResidualIsOfFirstOrderInTheStep) {
   for (const double dt : steps) {
     std::map<std::string, double> sum;
     for (int seed = 1; seed <= 3; ++seed) {
-      const std::string stages = fill + "[[stage]]\nkind = \"settle\"\nuntil = { kinetic_to_potential = 1e-3, window = \"5 ms\" }\n" + press;
-      const Trial run = run_case(small_bed + stages, {"time.step=" + std::to_string(1e6 * dt) + "e-6", "case.seed=" + std::to_string(seed), "particles.count=150",
-                                                      "output.series=\"1 ms\""});
+      const std::string stages =
+          fill + "[[stage]]\nkind = \"settle\"\nuntil = { kinetic_to_potential = 1e-3, window = \"5 ms\" }\n" + press;
+      const Trial run = run_case(small_bed + stages,
+                                 {"time.step=" + std::to_string(1e6 * dt) + "e-6", "case.seed=" + std::to_string(seed),
+                                  "particles.count=150", "output.series=\"1 ms\""});
       ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
       for (const char* stage : {"fill", "compress"}) {
         double largest = 0.0;
-        for (const std::size_t r : run.rows(stage)) largest = std::max(largest, std::fabs(run.at(r, "energy_residual")));
+        for (const std::size_t r : run.rows(stage))
+          largest = std::max(largest, std::fabs(run.at(r, "energy_residual")));
         sum[stage] += largest / 3.0;
       }
     }

@@ -80,12 +80,13 @@ TEST(Fill, APorosityThatCannotBeHadIsSaid) {
 }
 
 TEST(Fill, SizesOfADistributionAndOtherExponents) {
-  const std::string sizes = "particles.sizes={ kind = \"lognormal\", median = \"2.5 mm\", sigma = 0.2, min = \"2 mm\", max = \"3 mm\" }";
+  const std::string sizes =
+      "particles.sizes={ kind = \"lognormal\", median = \"2.5 mm\", sigma = 0.2, min = \"2 mm\", max = \"3 mm\" }";
   std::string text = small_bed + fill + quick_settle;
   text.replace(text.find("radius = \"2.5 mm\"\n"), std::string("radius = \"2.5 mm\"\n").size(), "");
   // k delta^1.5 like 5 kN/m at an overlap of 1 % of R.
-  const Trial run = run_case(text, {sizes, "box.width=\"24 mm\"", "particles.law.exponent=1.5", "particles.law.k1=1e6", "particles.law.k2=5e6",
-                                  "particles.law.k_adh=1e6", "time.step=\"auto\""});
+  const Trial run = run_case(text, {sizes, "box.width=\"24 mm\"", "particles.law.exponent=1.5", "particles.law.k1=1e6",
+                                    "particles.law.k2=5e6", "particles.law.k_adh=1e6", "time.step=\"auto\""});
   ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
   const auto R = ResultsFile(run.path() / "results.h5").doubles("/particles/radius");
   const auto [low, high] = std::minmax_element(R.values.begin(), R.values.end());
@@ -98,7 +99,8 @@ TEST(Fill, SizesOfADistributionAndOtherExponents) {
 }
 
 TEST(Vibrate, TheBottomIsASineAndEndsExactlyAtZero) {
-  const std::string shake = "[[stage]]\nkind = \"vibrate\"\nfrequency = 60\namplitude = \"1.5 mm\"\nduration = \"40 ms\"\n";
+  const std::string shake =
+      "[[stage]]\nkind = \"vibrate\"\nfrequency = 60\namplitude = \"1.5 mm\"\nduration = \"40 ms\"\n";
   Bench bench(small_bed + fill + shake, {"particles.count=20"});
   bench.drive(0);
   Stand stand = bench.stand(1);
@@ -128,7 +130,8 @@ TEST(Vibrate, TheBottomIsASineAndEndsExactlyAtZero) {
 }
 
 TEST(Vibrate, TakesItsDurationAndDensifies) {
-  const std::string shake = "[[stage]]\nkind = \"vibrate\"\nfrequency = 60\namplitude = \"1.5 mm\"\nduration = \"0.3 s\"\n";
+  const std::string shake =
+      "[[stage]]\nkind = \"vibrate\"\nfrequency = 60\namplitude = \"1.5 mm\"\nduration = \"0.3 s\"\n";
   const Trial run = run_case(small_bed + fill + shake + quick_settle, {"particles.law.k_adh=0", "particles.count=150"});
   ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
   EXPECT_EQ(run.stage("vibrate").last_step - run.stage("vibrate").first_step, 30000);
@@ -142,7 +145,8 @@ TEST(Vibrate, TakesItsDurationAndDensifies) {
 
 // The criterion from the rows: at its end, and not a look earlier.
 TEST(Settle, EndsWithTheFirstWindowOfRest) {
-  const Trial run = run_case(small_bed + fill + "[[stage]]\nkind = \"settle\"\nuntil = { kinetic_to_potential = 2e-5, window = \"30 ms\" }\n");
+  const Trial run = run_case(
+      small_bed + fill + "[[stage]]\nkind = \"settle\"\nuntil = { kinetic_to_potential = 2e-5, window = \"30 ms\" }\n");
   ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
   const auto rows = run.rows("settle");
   ASSERT_GT(rows.size(), 90u);
@@ -170,10 +174,13 @@ TEST(Settle, EndsWithTheFirstWindowOfRest) {
 }
 
 TEST(Settle, ABedThatNeverRestsEndsWithExitCode6AndItsData) {
-  const Trial run = run_case(small_bed + fill + "[[stage]]\nkind = \"settle\"\nmax_duration = \"20 ms\"\nuntil = { kinetic_to_potential = 1e-30 }\n" +
-                           time_passes("1 ms"));
+  const Trial run =
+      run_case(small_bed + fill +
+               "[[stage]]\nkind = \"settle\"\nmax_duration = \"20 ms\"\nuntil = { kinetic_to_potential = 1e-30 }\n" +
+               time_passes("1 ms"));
   EXPECT_EQ(run.outcome.exit_code, exit_goal);
-  EXPECT_NE(run.outcome.message.find("settle: goal not reached within max_duration"), std::string::npos) << run.outcome.message;
+  EXPECT_NE(run.outcome.message.find("settle: goal not reached within max_duration"), std::string::npos)
+      << run.outcome.message;
   ASSERT_EQ(run.outcome.stages.size(), 2u) << "nothing runs after it";
   EXPECT_EQ(run.stage("settle").last_step - run.stage("settle").first_step, 2000);
   EXPECT_FALSE(run.stage("settle").reached);
@@ -184,7 +191,8 @@ TEST(Settle, ABedThatNeverRestsEndsWithExitCode6AndItsData) {
 TEST(Settle, WithoutGravityTheEnergyOfTheStartIsTheMeasure) {
   // Two spheres that meet and stick [A45]; open sides, no plates, no box.
   const std::string table = "x,y,z,vx\n0,0,0,0.1\n0.0051,0,0,-0.1\n";
-  const Trial run = run_case(table_case("[[stage]]\nkind = \"settle\"\nuntil = { window = \"10 ms\" }\n"), {}, {}, table);
+  const Trial run =
+      run_case(table_case("[[stage]]\nkind = \"settle\"\nuntil = { window = \"10 ms\" }\n"), {}, {}, table);
   ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
   const auto rows = run.rows("settle");
   const double start = run.at(rows.front(), "kinetic_energy");
@@ -201,7 +209,9 @@ TEST(Settle, WithoutGravityTheEnergyOfTheStartIsTheMeasure) {
 
 TEST(Settle, SpheresThatNeverMoveAreAtRest) {
   const std::string table = "x,y,z\n0,0,0\n0.01,0,0\n";
-  const Trial run = run_case(table_case("[[stage]]\nkind = \"settle\"\nmax_duration = \"1 s\"\nuntil = { window = \"10 ms\" }\n"), {}, {}, table);
+  const Trial run =
+      run_case(table_case("[[stage]]\nkind = \"settle\"\nmax_duration = \"1 s\"\nuntil = { window = \"10 ms\" }\n"), {},
+               {}, table);
   EXPECT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
   EXPECT_NEAR(run.stage("settle").time_end, 0.01, 2 * 3.2e-4);
 }
@@ -209,8 +219,9 @@ TEST(Settle, SpheresThatNeverMoveAreAtRest) {
 TEST(Settle, WithoutGravityABedThatOnlyThenStartsToMoveComesToRest) {
   // Overlapping spheres at rest push each other: there is no energy at the start to compare with.
   const std::string table = "x,y,z\n0,0,0\n0.0049,0,0\n0.0024,0.0043,0\n";
-  const Trial run = run_case(table_case("[[stage]]\nkind = \"settle\"\nmax_duration = \"2 s\"\nuntil = { window = \"10 ms\" }\n"),
-                           {"particles.law.k_adh=5e3"}, {}, table);
+  const Trial run =
+      run_case(table_case("[[stage]]\nkind = \"settle\"\nmax_duration = \"2 s\"\nuntil = { window = \"10 ms\" }\n"),
+               {"particles.law.k_adh=5e3"}, {}, table);
   EXPECT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
 }
 
@@ -231,11 +242,12 @@ TEST(RunStage, TakesExactlyItsTime) {
 
 TEST(RunStage, HalfAStepMoreEndsAtTheSameStepHoweverOftenRowsAreWritten) {
   const std::string table = "x,y,z\n0,0,1\n";
-  for (const auto& [duration, steps] : {std::pair("1 ms", 62.5), std::pair("1.008 ms", 63.0), std::pair("0.5 ms", 31.25)}) {  // of 16 us
+  for (const auto& [duration, steps] :
+       {std::pair("1 ms", 62.5), std::pair("1.008 ms", 63.0), std::pair("0.5 ms", 31.25)}) {  // of 16 us
     std::vector<std::int64_t> last;
     for (const char* series : {"1 s", "16 us", "0.2 ms", "31 us"}) {
       const Trial run = run_case(table_case(time_passes(duration), "", "9.81"),
-                               {"time.step=\"16 us\"", std::string("output.series=\"") + series + "\""}, {}, table);
+                                 {"time.step=\"16 us\"", std::string("output.series=\"") + series + "\""}, {}, table);
       ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
       last.push_back(run.stage("run").last_step);
     }

@@ -11,9 +11,11 @@ namespace {
 // The whole protocol once, for the tests that only look at it.
 const Trial& protocol_run() {
   static const Trial run = [] {
-    const std::string text = small_bed + fill + quick_settle + press + time_passes("20 ms") + unload + time_passes("0.15 s") +
-                             "[[stage]]\nkind = \"release\"\nuntil = { kinetic_to_potential = 1e-4, window = \"20 ms\" }\n" +
-                             "[[stage]]\nkind = \"crush\"\nspeed = \"50 mm/s\"\nstart_gap = \"0.1 mm\"\nuntil = { strain = 0.15, drop = 0.2 }\n";
+    const std::string text =
+        small_bed + fill + quick_settle + press + time_passes("20 ms") + unload + time_passes("0.15 s") +
+        "[[stage]]\nkind = \"release\"\nuntil = { kinetic_to_potential = 1e-4, window = \"20 ms\" }\n" +
+        "[[stage]]\nkind = \"crush\"\nspeed = \"50 mm/s\"\nstart_gap = \"0.1 mm\"\nuntil = { strain = 0.15, drop = 0.2 "
+        "}\n";
     return run_case(text, {"particles.count=250", "box.width=\"30 mm\"", "box.depth=\"30 mm\""});
   }();
   return run;
@@ -85,8 +87,11 @@ TEST(Compress, QuantitiesFollowTheirDefinitions) {
 }
 
 TEST(Compress, OtherGoals) {
-  const std::string more = "[[stage]]\nkind = \"compress\"\nspeed = \"50 mm/s\"\nstart_gap = \"0.1 mm\"\nstrain_zero = \"500 Pa\"\nuntil = { ";
-  for (const auto& [goal, column, value] : {std::tuple("strain = 0.02", "strain", 0.02), std::tuple("porosity = 0.42", "porosity", 0.42)}) {
+  const std::string more =
+      "[[stage]]\nkind = \"compress\"\nspeed = \"50 mm/s\"\nstart_gap = \"0.1 mm\"\nstrain_zero = \"500 Pa\"\nuntil = "
+      "{ ";
+  for (const auto& [goal, column, value] :
+       {std::tuple("strain = 0.02", "strain", 0.02), std::tuple("porosity = 0.42", "porosity", 0.42)}) {
     const Trial run = run_case(small_bed + fill + more + goal + " }\n", {"particles.count=60"});
     ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
     const auto rows = run.rows("compress");
@@ -100,8 +105,8 @@ TEST(Compress, OtherGoals) {
 // Once the plate touches, the height is the plate's; its path is speed times time to the last bit that counts.
 TEST(Compress, DisplacementAndDurationAreExact) {
   const std::string one = "[[stage]]\nkind = \"compress\"\nspeed = \"30 mm/s\"\nuntil = { ";
-  const Trial run = run_case(small_bed + fill + press + one + "displacement = \"0.1 mm\" }\n" + one + "duration = \"5 ms\" }\n" + one +
-                             "duration = \"5 ms\", displacement = \"0.1 mm\" }\n");
+  const Trial run = run_case(small_bed + fill + press + one + "displacement = \"0.1 mm\" }\n" + one +
+                             "duration = \"5 ms\" }\n" + one + "duration = \"5 ms\", displacement = \"0.1 mm\" }\n");
   ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
   const auto moved = [&](const std::string& before, const std::string& stage) {
     return run.stage(before).last.measures.height - run.stage(stage).last.measures.height;
@@ -118,7 +123,8 @@ TEST(Compress, DisplacementAndDurationAreExact) {
 }
 
 TEST(Compress, StartGap) {
-  Bench bench(small_bed + fill + press + press + "[[stage]]\nkind = \"compress\"\nspeed = \"50 mm/s\"\nuntil = { duration = \"1 ms\" }\n");
+  Bench bench(small_bed + fill + press + press +
+              "[[stage]]\nkind = \"compress\"\nspeed = \"50 mm/s\"\nuntil = { duration = \"1 ms\" }\n");
   bench.drive(0);
   const double parked = bench.sim->plane_position(plate_top);
   Stand last = bench.stand(3);
@@ -164,7 +170,9 @@ TEST(Unload, KeepsTheZeroOfTheCompressionAndLeavesTheWeight) {
 }
 
 TEST(Unload, ToAStressAndByADistance) {
-  const Trial run = run_case(small_bed + fill + press + unload + "until = { stress = \"4 kPa\" }\n" + "[[stage]]\nkind = \"unload\"\nspeed = \"20 mm/s\"\nuntil = { displacement = \"1 mm\" }\n");
+  const Trial run =
+      run_case(small_bed + fill + press + unload + "until = { stress = \"4 kPa\" }\n" +
+               "[[stage]]\nkind = \"unload\"\nspeed = \"20 mm/s\"\nuntil = { displacement = \"1 mm\" }\n");
   ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
   const auto rows = run.rows("unload");
   EXPECT_LE(run.at(rows.back(), "stress_top"), 4e3);
@@ -174,9 +182,13 @@ TEST(Unload, ToAStressAndByADistance) {
 
 TEST(Hold, KeepsTheStress) {
   // As compressed, less and more: on the stiff and on the soft branch of the bed.
-  const auto hold = [](double stress) { return "[[stage]]\nkind = \"hold\"\nduration = \"0.2 s\"\nstress = " + std::to_string(stress) + "\n"; };
-  for (const auto& [stress, adhesion] : {std::pair(20e3, "0"), std::pair(12e3, "0"), std::pair(12e3, "5e3"), std::pair(25e3, "0"), std::pair(25e3, "5e3")}) {
-    const Trial run = run_case(small_bed + fill + press + hold(stress), {std::string("particles.law.k_adh=") + adhesion});
+  const auto hold = [](double stress) {
+    return "[[stage]]\nkind = \"hold\"\nduration = \"0.2 s\"\nstress = " + std::to_string(stress) + "\n";
+  };
+  for (const auto& [stress, adhesion] : {std::pair(20e3, "0"), std::pair(12e3, "0"), std::pair(12e3, "5e3"),
+                                         std::pair(25e3, "0"), std::pair(25e3, "5e3")}) {
+    const Trial run =
+        run_case(small_bed + fill + press + hold(stress), {std::string("particles.law.k_adh=") + adhesion});
     ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
     EXPECT_EQ(run.stage("hold").last_step - run.stage("hold").first_step, 20000);
     const auto rows = run.rows("hold");
@@ -197,7 +209,8 @@ double stored(const Ledger& l) { return l.elastic_energy + l.adhesion_energy + l
 TEST(Release, DeletesWhatMetThroughTheSidesAndNothingElse) {
   for (const char* sides : {"periodic", "walls"}) {
     const bool periodic = std::string(sides) == "periodic";
-    Bench bench(small_bed + fill + quick_settle + press + "[[stage]]\nkind = \"release\"\n", {std::string("box.sides=\"") + sides + "\"", "particles.count=80"});
+    Bench bench(small_bed + fill + quick_settle + press + "[[stage]]\nkind = \"release\"\n",
+                {std::string("box.sides=\"") + sides + "\"", "particles.count=80"});
     for (std::size_t k = 0; k < 3; ++k) bench.drive(k);
     Simulation& sim = *bench.sim;
     const Snapshot before = sim.snapshot();
@@ -218,7 +231,8 @@ TEST(Release, DeletesWhatMetThroughTheSidesAndNothingElse) {
     for (std::size_t k = 0; k < before.contacts.size(); ++k)
       if (before.contacts.image[2 * k] == 0 && before.contacts.image[2 * k + 1] == 0)
         inside.insert({before.contacts.pair[2 * k], before.contacts.pair[2 * k + 1]});
-    for (std::size_t k = 0; k < after.contacts.size(); ++k) left.insert({after.contacts.pair[2 * k], after.contacts.pair[2 * k + 1]});
+    for (std::size_t k = 0; k < after.contacts.size(); ++k)
+      left.insert({after.contacts.pair[2 * k], after.contacts.pair[2 * k + 1]});
     EXPECT_EQ(inside, left);
     EXPECT_EQ(left.size() < before.contacts.size(), periodic);
     // The history of what stays: the same plastic overlap and springs.
@@ -233,7 +247,9 @@ TEST(Release, DeletesWhatMetThroughTheSidesAndNothingElse) {
     EXPECT_GT(taken, 0.0);
     EXPECT_NEAR(m1.ledger.removed_energy - m0.ledger.removed_energy, taken, 1e-12 * stored(m0.ledger));
     // But for the half kick by which velocities are brought to the full time: it knows the new forces.
-    const auto without_kick = [](const Measures& m) { return m.energy_residual - m.kinetic_energy - m.ledger.rolling_dissipation; };
+    const auto without_kick = [](const Measures& m) {
+      return m.energy_residual - m.kinetic_energy - m.ledger.rolling_dissipation;
+    };
     EXPECT_NEAR(without_kick(m1), without_kick(m0), 1e-9 * stored(m0.ledger)) << sides;
   }
 }
@@ -304,8 +320,10 @@ TEST(Crush, EndsAtItsDropAndCallsItAPeak) {
   for (std::size_t k = 0; k < c.strain.size() && end == c.strain.size(); ++k) {
     peak = std::max(peak, c.smooth[k]);
     if (peak < 200.0) continue;
-    if (c.smooth[k] >= 0.8 * peak) low_since = std::nan("");
-    else if (std::isnan(low_since)) low_since = c.strain[k];
+    if (c.smooth[k] >= 0.8 * peak)
+      low_since = std::nan("");
+    else if (std::isnan(low_since))
+      low_since = c.strain[k];
     if (c.strain[k] - low_since >= 0.02) end = k;
   }
   if (crush.end_reason.find("below the peak") != std::string::npos) {
@@ -318,9 +336,10 @@ TEST(Crush, EndsAtItsDropAndCallsItAPeak) {
 }
 
 TEST(Crush, StillRisingIsNoPeak) {
-  const std::string text = small_bed + fill + quick_settle + press + unload +
-                           "[[stage]]\nkind = \"release\"\nuntil = { kinetic_to_potential = 1e-3, window = \"5 ms\" }\n" +
-                           "[[stage]]\nkind = \"crush\"\nspeed = \"50 mm/s\"\nstart_gap = \"0.1 mm\"\nuntil = { stress = \"400 Pa\" }\n";
+  const std::string text =
+      small_bed + fill + quick_settle + press + unload +
+      "[[stage]]\nkind = \"release\"\nuntil = { kinetic_to_potential = 1e-3, window = \"5 ms\" }\n" +
+      "[[stage]]\nkind = \"crush\"\nspeed = \"50 mm/s\"\nstart_gap = \"0.1 mm\"\nuntil = { stress = \"400 Pa\" }\n";
   const Trial run = run_case(text, {"particles.count=60", "particles.law.k_adh=1e4"});
   ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
   const StageResult& crush = run.stage("crush");
@@ -331,8 +350,10 @@ TEST(Crush, StillRisingIsNoPeak) {
 
 TEST(Crush, AGoalThatIsNeverReachedIsReported) {
   // Nothing under the plate: it drives through the empty space above three spheres for ever.
-  const Trial run = run_case(small_bed + fill + "[[stage]]\nkind = \"crush\"\nspeed = \"1 mm/s\"\nmax_duration = \"10 ms\"\nuntil = { strain = 0.1 }\n",
-                             {"particles.count=3"});
+  const Trial run = run_case(
+      small_bed + fill +
+          "[[stage]]\nkind = \"crush\"\nspeed = \"1 mm/s\"\nmax_duration = \"10 ms\"\nuntil = { strain = 0.1 }\n",
+      {"particles.count=3"});
   EXPECT_EQ(run.outcome.exit_code, exit_goal);
   EXPECT_EQ(run.stage("crush").last_step - run.stage("crush").first_step, 1000);
   EXPECT_FALSE(run.stage("crush").strength);

@@ -130,14 +130,16 @@ TEST(Verification, SlideToRoll) {
     law.k1 = law.k2 = 5e3;
     SimulationSetup setup = nothing_around(law);
     setup.gravity = 9.81;
-    setup.plate.friction = row.mu, setup.plate.rolling_friction = row.mu_r;
+    // The dashpot acts until the spring has reached its limit, one step at least: a blow of c_t v_0 dt that the closed
+    // form does not know. With e = 0.9 it is small.
+    setup.plate.friction = row.mu, setup.plate.rolling_friction = row.mu_r, setup.plate.restitution = 0.9;
     const double E = 1.0 / ((1.0 - 0.09) / 2.6e8 + (1.0 - 0.0625) / 2.5e10), m = mass_of(row.R);
     const double rest = std::pow(0.75 * m * 9.81 / (E * std::sqrt(row.R)), 2.0 / 3.0);
     add(setup, {0, 0, row.R - rest}, {row.v0, 0, 0}, row.R);
     Simulation sim(setup);
     const double t = row.v0 / (row.mu * 9.81 + 2.5 * (row.mu - row.mu_r) * 9.81), v = row.v0 - row.mu * 9.81 * t;
-    // Stiff against its weight: the step comes from the contact at rest, 1/20 of its critical one.
-    const double dt = 0.1 * std::sqrt(m / (2.0 * E * std::sqrt(row.R * rest)));
+    // Stiff against its weight: the step comes from the contact at rest, 1/100 of its critical one.
+    const double dt = 0.02 * std::sqrt(m / (2.0 * E * std::sqrt(row.R * rest)));
     sim.set_time_step(dt);
     sim.set_plane(plate_bottom, {});
     const std::string at = text("R = %g m", row.R) + text(", v0 = %g m/s", row.v0) + text(", mu = %g", row.mu) + text(", mu_r = %g", row.mu_r);
@@ -155,9 +157,9 @@ TEST(Verification, SlideToRoll) {
     time.check(at, end, t, 0.01 * t);
     speed.check(at, p.velocity[0] / row.v0, v / row.v0, 0.005 * v / row.v0);
     if (row.mu_r == 0.0) continue;
-    sim.advance(50 * chunk);  // the elastic slip rings out
+    sim.advance(2000 * chunk);  // the elastic slip rings out
     const double v1 = sim.snapshot(false).particles.velocity[0], t1 = sim.time();
-    sim.advance(400 * chunk);
+    sim.advance(2000 * chunk);
     const double v2 = sim.snapshot(false).particles.velocity[0];
     braking.check(at, (v1 - v2) / (sim.time() - t1) / (5.0 / 7.0 * row.mu_r * 9.81), 1.0, 0.01);
   }

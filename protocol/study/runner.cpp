@@ -1,0 +1,264 @@
+#include "protocol/study/runner.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <signal.h>
+#include <sys/file.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <thread>
+
+#include "protocol/output/files.h"
+
+namespace platen {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+double since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+std::string text_of(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+// The last line of a log that is not empty.
+std::string last_line(const fs::path& log) {
+  std::istringstream lines(text_of(log));
+  std::string found;
+  for (std::string line; std::getline(lines, line);)
+    if (line.find_first_not_of(" \t\r") != std::string::npos) found = line;
+  return found;
+}
+
+// A run that was killed a moment ago may still hold its folder: waits until nobody does, at most 10 s. After that the
+// child itself says who holds it.
+void wait_until_free(const fs::path& folder) {
+  const int fd = ::open((folder / ".lock").c_str(), O_RDWR | O_CLOEXEC);
+  if (fd < 0) return;
+  for (int k = 0; k < 1000 && ::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK; ++k)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  ::close(fd);
+}
+
+// Starts the program with its output in `log`; the child gets `end_signal` when this process ends.
+pid_t start(const std::vector<std::string>& words, const fs::path& log) {
+  std::vector<char*> argv;
+  for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
+  argv.push_back(nullptr);
+  const int out = ::open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (out < 0) throw system_error(log, "cannot open", errno);
+  const UniqueFd held(out);
+  const pid_t parent = ::getpid();
+  const pid_t child = ::fork();
+  if (child < 0) throw OutputError(fmt::format("cannot start {}: {}", words.front(), std::strerror(errno)));
+  if (child > 0) return child;
+  // Only calls that are allowed between fork and exec.
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != parent) ::_exit(127);  // it ended before the line above
+  ::dup2(out, 1);
+  ::dup2(out, 2);
+  const int nothing = ::open("/dev/null", O_RDONLY);
+  if (nothing >= 0) ::dup2(nothing, 0);
+  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGXCPU, SIGPIPE, SIGXFSZ, SIGUSR1}) ::signal(number, SIG_DFL);
+  ::execv(argv[0], argv.data());
+  ::_exit(127);
+}
+
+class Runner {
+ public:
+  Runner(const StudyPlan& plan, const RunnerOptions& options)
+      : plan_(plan), options_(options), outcomes_(plan.jobs.size()) {
+    std::error_code error;
+    program_ = fs::read_symlink(options.program, error).string();
+    if (error) program_ = options.program.string();
+    for (const char* name : {"cases", "logs", "runs"}) {
+      fs::create_directories(options.folder / name, error);
+      if (error) throw OutputError((options.folder / name).string() + ": cannot write: " + error.message());
+    }
+    for (const Job& job : plan.jobs) all_weight_ += job.weight;
+  }
+
+  std::vector<JobOutcome> run() {
+    std::vector<std::size_t> many, alone;
+    for (std::size_t k = 0; k < plan_.jobs.size(); ++k) {
+      if (is_done(options_.folder, plan_.jobs[k])) {
+        outcomes_[k].state = JobState::kept;
+        all_weight_ -= plan_.jobs[k].weight;
+        ++finished_;
+        if (options_.ended) options_.ended(plan_.jobs[k], outcomes_[k]);
+      } else {
+        (plan_.jobs[k].timed ? alone : many).push_back(k);
+      }
+    }
+    std::stable_sort(many.begin(), many.end(), [&](std::size_t a, std::size_t b) {
+      const Job &p = plan_.jobs[a], &q = plan_.jobs[b];
+      return p.c.seed != q.c.seed ? p.c.seed < q.c.seed : p.weight > q.weight;
+    });
+    // By repetition: the plan has them side by side.
+    const auto repetition = [&](std::size_t k) { return plan_.jobs[k].name.substr(plan_.jobs[k].name.rfind("-t")); };
+    std::stable_sort(alone.begin(), alone.end(), [&](std::size_t a, std::size_t b) {
+      const std::string p = repetition(a), q = repetition(b);
+      return p.size() != q.size() ? p.size() < q.size() : p < q;
+    });
+    work(many, options_.jobs);
+    work(alone, 1);
+    for (JobOutcome& outcome : outcomes_)
+      if (outcome.state == JobState::waiting) outcome.state = JobState::stopped;
+    return std::move(outcomes_);
+  }
+
+ private:
+  struct Child {
+    pid_t pid;
+    std::size_t job;
+    Clock::time_point begin;
+    std::optional<double> steal;
+  };
+
+  bool stopping() const { return options_.stop_signal != nullptr && *options_.stop_signal != 0; }
+
+  void work(const std::vector<std::size_t>& queue, int at_once) {
+    std::size_t next = 0;
+    bool told = false;
+    while (next < queue.size() || !children_.empty()) {
+      while (!stopping() && next < queue.size() && static_cast<int>(children_.size()) < at_once) launch(queue[next++]);
+      if (stopping()) {
+        next = queue.size();
+        if (!told)
+          for (const Child& child : children_) ::kill(child.pid, SIGTERM);
+        told = true;
+      }
+      if (!reap() && !children_.empty()) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      report();
+    }
+  }
+
+  void launch(std::size_t k) {
+    const Job& job = plan_.jobs[k];
+    const fs::path folder = run_folder(options_.folder, job), file = options_.folder / "cases" / (job.name + ".toml");
+    write_whole_file(file, job.c.text);
+    wait_until_free(folder);
+    std::vector<std::string> words{program_, "run", file.string(), "-o", folder.string(), "--threads",
+                                   std::to_string(job.threads), "--force", "--quiet"};
+    outcomes_[k].state = JobState::running;
+    const std::optional<double> steal = job.timed ? steal_seconds() : std::nullopt;
+    children_.push_back({start(words, options_.folder / "logs" / (job.name + ".txt")), k, Clock::now(), steal});
+    newest_ = job.name;
+  }
+
+  // Takes in every child that has ended; whether there was one.
+  bool reap() {
+    bool any = false;
+    for (std::size_t i = 0; i < children_.size();) {
+      int status = 0;
+      const pid_t ended = ::waitpid(children_[i].pid, &status, WNOHANG);
+      if (ended == 0 || (ended < 0 && errno == EINTR)) {
+        ++i;
+        continue;
+      }
+      close(children_[i], status);
+      children_.erase(children_.begin() + static_cast<std::ptrdiff_t>(i));
+      any = true;
+    }
+    return any;
+  }
+
+  void close(const Child& child, int status) {
+    const Job& job = plan_.jobs[child.job];
+    JobOutcome& outcome = outcomes_[child.job];
+    outcome.wall_seconds = since(child.begin);
+    outcome.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    if (stopping() && outcome.exit_code != 0) {
+      outcome.state = JobState::stopped;
+    } else if (is_done(options_.folder, job)) {
+      outcome.state = JobState::done;
+      outcome.exit_code = 0;
+      done_weight_ += job.weight;
+      done_seconds_ += outcome.wall_seconds;
+      if (child.steal) {
+        if (const auto now = steal_seconds()) outcome.steal_seconds = *now - *child.steal;
+        const nlohmann::json timing = {{"wall_seconds", outcome.wall_seconds}, {"steal_seconds", outcome.steal_seconds.value_or(0.0)}};
+        write_whole_file(run_folder(options_.folder, job) / "timing.json", timing.dump(2) + "\n");
+      }
+    } else {
+      outcome.state = JobState::failed;
+      outcome.message = WIFEXITED(status) ? last_line(options_.folder / "logs" / (job.name + ".txt"))
+                                          : fmt::format("ended by signal {}", WTERMSIG(status));
+      if (outcome.message.empty()) outcome.message = fmt::format("exit code {}", outcome.exit_code);
+      all_weight_ -= job.weight;
+      ++failed_;
+    }
+    if (outcome.state != JobState::stopped) ++finished_;
+    newest_ = job.name;
+    if (options_.ended) options_.ended(job, outcome);
+  }
+
+  void report() {
+    if (!options_.progress) return;
+    StudyProgress p;
+    p.jobs = plan_.jobs.size();
+    p.finished = finished_;
+    p.failed = failed_;
+    p.running = children_.size();
+    p.wall_seconds = since(begin_);
+    p.newest = newest_;
+    double under_way = 0.0;  // cost of the running jobs that is behind them, as the finished ones suggest
+    if (done_seconds_ > 0.0) {
+      const double rate = done_weight_ / done_seconds_;
+      for (const Child& child : children_)
+        under_way += std::min(0.95 * plan_.jobs[child.job].weight, rate * since(child.begin));
+      const double left = std::max(0.0, all_weight_ - done_weight_ - under_way) / rate;
+      p.seconds_left = left / std::max<double>(1.0, std::min<double>(options_.jobs, static_cast<double>(p.jobs - finished_)));
+    }
+    p.fraction = all_weight_ > 0.0 ? (done_weight_ + under_way) / all_weight_ : 1.0;
+    options_.progress(p);
+  }
+
+  const StudyPlan& plan_;
+  const RunnerOptions& options_;
+  std::vector<JobOutcome> outcomes_;
+  std::string program_, newest_;
+  std::vector<Child> children_;
+  Clock::time_point begin_ = Clock::now();
+  double all_weight_ = 0.0, done_weight_ = 0.0, done_seconds_ = 0.0;
+  std::size_t finished_ = 0, failed_ = 0;
+};
+
+}  // namespace
+
+fs::path run_folder(const fs::path& study_folder, const Job& job) { return study_folder / "runs" / job.name; }
+
+bool is_done(const fs::path& study_folder, const Job& job) {
+  const fs::path folder = run_folder(study_folder, job);
+  std::error_code ignored;
+  if (!fs::is_regular_file(folder / "summary.json", ignored) || text_of(folder / "case.toml") != job.c.text) return false;
+  const nlohmann::json summary = nlohmann::json::parse(text_of(folder / "summary.json"), nullptr, false);
+  return summary.is_object() && summary.contains("exit_code") && summary["exit_code"] == 0;
+}
+
+std::vector<JobOutcome> run_jobs(const StudyPlan& plan, const RunnerOptions& options) { return Runner(plan, options).run(); }
+
+std::optional<double> steal_seconds() {
+  std::ifstream stat("/proc/stat");
+  std::string word;
+  double value = 0.0, steal = 0.0;
+  if (!(stat >> word) || word != "cpu") return std::nullopt;
+  for (int k = 0; k < 8; ++k) {
+    if (!(stat >> value)) return std::nullopt;
+    steal = value;  // the eighth number
+  }
+  return steal / static_cast<double>(::sysconf(_SC_CLK_TCK));
+}
+
+}  // namespace platen
