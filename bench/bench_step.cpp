@@ -51,6 +51,7 @@ int main(int argc, char** argv) {
            {"scalar", "against a plain scalar half-list step, checked to agree"},
            {"executors", "flow graph against two parallel_for a step"},
            {"rain", "loose falling spheres, rebuilds included"},
+           {"rebuilds", "the cost of making all lists anew"},
            {"one", "blocks of one scene as one JSON line"},
            {"one-rain", "the same for rain"},
            {"scenes", "lists the scenes"},
@@ -68,6 +69,7 @@ int main(int argc, char** argv) {
     if (mode == "scalar" && !table_of_scalar(options)) return 1;
     if (mode == "executors" && !table_of_executors(options)) return 1;
     if (mode == "rain") table_of_rain(options);
+    if (mode == "rebuilds") table_of_rebuilds(options);
     if (mode == "one") one_block(options, false);
     if (mode == "one-rain") one_block(options, true);
     if (mode == "scenes")

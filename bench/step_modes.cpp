@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 
 #include "bench/parallel_for_step.h"
 #include "bench/reference_loops.h"
@@ -215,6 +216,36 @@ bool table_of_scalar(const StepOptions& o) {
   write_json(o.json, "scalar", table);
   if (!right) fmt::print(stderr, "bench_step: the scalar step and platen do not agree to 1e-9 R after 100 steps\n");
   return right;
+}
+
+void table_of_rebuilds(const StepOptions& o) {
+  Table table("A rebuild: Morton sort, outer and inner lists, history, graph",
+              {particles_column, {"threads", "threads", 8, 0}, {"wall", "ns/particle", 13, 0}, {"cpu", "cpu ns/particle", 17, 0},
+               z_column, {"listed", "listed", 8}, fma_column, l2_column, l3_column, state_column});
+  for (const std::int64_t particles : either(o.particles, {35000}))
+    for (const int threads : either(o.threads, {1, 2})) {
+      const Bed bed = dense_bed(particles, o.beds);
+      const InstructionSet set = sets_of(o).front();
+      const BenchScene scene = bench_scene("full");
+      const auto sim = make_simulation(bed, scene, engine_of(o, set, threads));
+      sim->advance(32);
+      constexpr int times = 4;
+      std::vector<double> cpu;
+      const Timing timing = run_in_turn({{"rebuild", [&] {
+                                            const std::clock_t start = std::clock();
+                                            const double seconds = seconds_of([&] {
+                                              for (int k = 0; k < times; ++k) sim->rebuild_now();
+                                            });
+                                            cpu.push_back(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
+                                            return seconds;
+                                          }}}, o.rounds).front();
+      nlohmann::json row = row_of(*sim, scene, threads);
+      const double each = 1e9 / (times * static_cast<double>(bed.size()));
+      row["wall"] = each * timing.typical(), row["cpu"] = each * median(cpu);
+      add_reference(row, set);
+      table.add(row);
+    }
+  write_json(o.json, "rebuilds", table);
 }
 
 bool table_of_executors(const StepOptions& o) {

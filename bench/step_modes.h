@@ -37,6 +37,8 @@ bool table_of_scalar(const StepOptions& options);
 bool table_of_executors(const StepOptions& options);
 // Rain from its start file, 2,000 steps or more, rebuilds included.
 void table_of_rain(const StepOptions& options);
+// Sorting and listing everything anew: ns per particle, by wall clock and by processor time of all threads.
+void table_of_rebuilds(const StepOptions& options);
 // One scene on one bed, one JSON line on standard output: for scripts that run other programs in turn with it.
 void one_block(const StepOptions& options, bool rain);
 

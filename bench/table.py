@@ -75,6 +75,11 @@ def make(folder):
         parts.append(f"### What a feature costs, {rows[0]['particles']:,} particles, one thread, blocks in turn\n\n" + table(
             ("scene", "kernels", "M/s", "time over that of `full`", "ns per contact", "Z"),
             [(r["scene"], r["kernels"], number(r["rate"]), number(r["relative"], 2), number(r.get("ns")), number(r["Z"], 2)) for r in rows]))
+    rows = rows_of(folder, "rebuilds")
+    if rows:
+        parts.append("### A rebuild of all lists\n\n" + table(
+            ("particles", "threads", "ns per particle (asked 450 on one thread)", "processor ns per particle", "FMA / L2 / L3"),
+            [(f"{r['particles']:,}", r["threads"], number(r["wall"], 0), number(r["cpu"], 0), state(r)) for r in rows]))
     rows = rows_of(folder, "rain")
     if rows:
         parts.append("### Rain, 35,000 spheres\n\n" + table(

@@ -4,7 +4,7 @@
 //   fabric_ab = mean over pairs of n_a n_b              [Satake1982]; trace 1
 //
 // F is the force on sphere i; l goes to its centre from that of j (pairs) or from the nearest point of the plane (plates
-// and walls). At rest, moments of the forces about any plane give, without approximation,
+// and walls). At rest, and without friction at walls, moments of the forces give, without approximation,
 //   V stress_zz = stress_top A h + sum m g (z - z_bottom)
 // so the tensor and the plates' forces judge each other. Kinetic stress is left out: a bed in motion has more.
 #pragma once

@@ -35,11 +35,9 @@ std::vector<double> centred(const std::vector<double>& time, const std::vector<d
     while (time[a] < time[i] - half) ++a;
     b = std::max(b, i);
     while (b + 1 < time.size() && time[b + 1] <= time[i] + half) ++b;
-    std::size_t end = b;
-    while (end > i && time[end] > time[i] + half) --end;
     double sum = 0.0;
-    for (std::size_t k = a; k <= end; ++k) sum += value[k];
-    out[i] = sum / static_cast<double>(end - a + 1);
+    for (std::size_t k = a; k <= b; ++k) sum += value[k];
+    out[i] = sum / static_cast<double>(b - a + 1);
   }
   return out;
 }
@@ -161,6 +159,7 @@ void measure_compression(const SeriesTable& series, const Case& c, std::optional
   out.curves["porosity"] = branch(rows, rows.porosity, 1.0, low);
   out.curves["coordination"] = branch(rows, rows.coordination, 1.0, low);
   put(out, "porosity_start", value_at(out.curves["porosity"], low));
+  put(out, "porosity_at_100_pa", value_at(branch(rows, rows.porosity, 1.0, 100.0), 100.0));
   put(out, "porosity_at_zero", value_at(out.curves["porosity"], zero));
   put(out, "porosity_peak", at_end(rows, rows.porosity));
   put(out, "coordination_peak", at_end(rows, rows.coordination));
@@ -252,6 +251,7 @@ const ObservableKind& observable_kind(std::string_view name) {
 const std::vector<ScalarKind>& scalar_kinds() {
   static const std::vector<ScalarKind> kinds{
       {"porosity_filled", "-", "porosity at the end of fill"},
+      {"porosity_at_100_pa", "-", "porosity when the stress first reaches 0.1 kPa"},
       {"porosity_start", "-", "porosity when the stress first reaches 1 kPa, or the strain zero where that is lower"},
       {"porosity_at_zero", "-", "porosity at the strain zero"},
       {"porosity_peak", "-", "porosity at the end of the compression"},

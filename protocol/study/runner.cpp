@@ -52,7 +52,7 @@ void wait_until_free(const fs::path& folder) {
 }
 
 // Starts the program with its output in `log`; the child gets `end_signal` when this process ends.
-pid_t start(const std::vector<std::string>& words, const fs::path& log) {
+pid_t start(const fs::path& program, const std::vector<std::string>& words, const fs::path& log) {
   std::vector<char*> argv;
   for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
   argv.push_back(nullptr);
@@ -61,7 +61,7 @@ pid_t start(const std::vector<std::string>& words, const fs::path& log) {
   const UniqueFd held(out);
   const pid_t parent = ::getpid();
   const pid_t child = ::fork();
-  if (child < 0) throw OutputError(fmt::format("cannot start {}: {}", words.front(), std::strerror(errno)));
+  if (child < 0) throw OutputError(fmt::format("cannot start {}: {}", program.string(), std::strerror(errno)));
   if (child > 0) return child;
   // Only calls that are allowed between fork and exec.
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -71,7 +71,7 @@ pid_t start(const std::vector<std::string>& words, const fs::path& log) {
   const int nothing = ::open("/dev/null", O_RDONLY);
   if (nothing >= 0) ::dup2(nothing, 0);
   for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGXCPU, SIGPIPE, SIGXFSZ, SIGUSR1}) ::signal(number, SIG_DFL);
-  ::execv(argv[0], argv.data());
+  ::execv(program.c_str(), argv.data());
   ::_exit(127);
 }
 
@@ -80,8 +80,6 @@ class Runner {
   Runner(const StudyPlan& plan, const RunnerOptions& options)
       : plan_(plan), options_(options), outcomes_(plan.jobs.size()) {
     std::error_code error;
-    program_ = fs::read_symlink(options.program, error).string();
-    if (error) program_ = options.program.string();
     for (const char* name : {"cases", "logs", "runs"}) {
       fs::create_directories(options.folder / name, error);
       if (error) throw OutputError((options.folder / name).string() + ": cannot write: " + error.message());
@@ -149,11 +147,11 @@ class Runner {
     const fs::path folder = run_folder(options_.folder, job), file = options_.folder / "cases" / (job.name + ".toml");
     write_whole_file(file, job.c.text);
     wait_until_free(folder);
-    std::vector<std::string> words{program_, "run", file.string(), "-o", folder.string(), "--threads",
+    std::vector<std::string> words{"platen", "run", file.string(), "-o", folder.string(), "--threads",
                                    std::to_string(job.threads), "--force", "--quiet"};
     outcomes_[k].state = JobState::running;
     const std::optional<double> steal = job.timed ? steal_seconds() : std::nullopt;
-    children_.push_back({start(words, options_.folder / "logs" / (job.name + ".txt")), k, Clock::now(), steal});
+    children_.push_back({start(options_.program, words, options_.folder / "logs" / (job.name + ".txt")), k, Clock::now(), steal});
     newest_ = job.name;
   }
 
@@ -228,7 +226,7 @@ class Runner {
   const StudyPlan& plan_;
   const RunnerOptions& options_;
   std::vector<JobOutcome> outcomes_;
-  std::string program_, newest_;
+  std::string newest_;
   std::vector<Child> children_;
   Clock::time_point begin_ = Clock::now();
   double all_weight_ = 0.0, done_weight_ = 0.0, done_seconds_ = 0.0;

@@ -1,0 +1,107 @@
+#include "protocol/study/judge.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace platen {
+
+std::string size_text(double radius) { return fmt::format("R = {:g} mm", 1e3 * radius); }
+
+bool Judge::is_plain(const MeasuredCurve& curve) const {
+  if (!curve.planned->varied.empty() || curve.planned->powers.dashpots) return false;
+  for (const CurveSpec& spec : part_.plan->study->curves)
+    if (spec.name == curve.planned->block) return spec.set.empty();
+  return false;
+}
+
+std::vector<const MeasuredCurve*> Judge::plain() const {
+  std::vector<const MeasuredCurve*> out;
+  for (const MeasuredCurve& curve : part_.curves)
+    if (is_plain(curve) && !curve.runs.empty()) out.push_back(&curve);
+  return out;
+}
+
+const MeasuredCurve* Judge::reference() const {
+  for (const MeasuredCurve* curve : plain())
+    if (curve->planned->radius == part_.plan->reference_radius) return curve;
+  return nullptr;
+}
+
+const MeasuredCurve* Judge::scaled(double radius, std::optional<double> a, std::optional<double> b) const {
+  for (const MeasuredCurve* curve : plain()) {
+    const ScalingPowers& powers = curve->planned->powers;
+    if (curve->planned->radius == radius && (!a || powers.stiffness == *a) && (!b || powers.adhesion == *b)) return curve;
+  }
+  return nullptr;
+}
+
+std::vector<double> Judge::radii() const {
+  std::set<double> out;
+  for (const MeasuredCurve* curve : plain())
+    if (curve->planned->radius != part_.plan->reference_radius) out.insert(curve->planned->radius);
+  return {out.begin(), out.end()};
+}
+
+double Judge::mean(const MeasuredCurve* curve, const std::string& scalar) {
+  if (curve == nullptr) return no_value;
+  const std::vector<double> values = curve->values(scalar);
+  return values.empty() ? no_value : spread_of(values).mean;
+}
+
+double Judge::deviation(const MeasuredCurve* curve, const std::string& scalar) {
+  return curve == nullptr ? no_value : spread_of(curve->values(scalar)).deviation.value_or(no_value);
+}
+
+std::string Judge::shown(const MeasuredCurve* curve, const std::string& scalar, double scale, int decimals) {
+  std::string text = fmt::format("{:.{}f}", scale * mean(curve, scalar), decimals);
+  const double d = deviation(curve, scalar);
+  if (std::isfinite(d)) text += fmt::format(" +- {:.{}f}", scale * d, decimals);
+  return text;
+}
+
+void Judge::number(const std::string& figure, const std::string& text, double value, Bounds bounds, int decimals,
+                   const std::string& unit, double scale) {
+  if (!std::isfinite(value)) return missing(figure, text);
+  const std::string with_unit = unit.empty() ? "" : " " + unit;
+  std::string allowed;
+  if (std::isfinite(bounds.low) && std::isfinite(bounds.high))
+    allowed = fmt::format("{:g} to {:g}{}", scale * bounds.low, scale * bounds.high, with_unit);
+  else if (std::isfinite(bounds.high)) allowed = fmt::format("at most {:g}{}", scale * bounds.high, with_unit);
+  else allowed = fmt::format("at least {:g}{}", scale * bounds.low, with_unit);
+  say(figure, text + ": " + allowed, fmt::format("{:.{}f}{}", scale * value, decimals, with_unit),
+      value >= bounds.low && value <= bounds.high);
+}
+
+void Judge::say(const std::string& figure, const std::string& text, const std::string& number, std::optional<bool> holds) {
+  out_->push_back({part_.plan->study->name, figure, text, number, holds});
+}
+
+double Judge::distance(const MeasuredCurve* a, const MeasuredCurve* b, const std::string& observable) {
+  if (a == nullptr || b == nullptr) return no_value;
+  const auto error = collapse_error(a->curves(observable), b->curves(observable));
+  return error ? error->of_means : no_value;
+}
+
+std::vector<double> Judge::difference(const MeasuredCurve* a, const std::string& of_a, const MeasuredCurve* b,
+                                      const std::string& of_b) {
+  if (a == nullptr || b == nullptr) return {};
+  std::vector<Curve> all = a->curves(of_a), others = b->curves(of_b);
+  const std::size_t first = all.size();
+  if (first == 0 || others.empty()) return {};
+  all.insert(all.end(), others.begin(), others.end());
+  const auto range = common_range(all);
+  if (!range) return {};
+  std::vector<double> out;
+  for (const double x : grid(*range)) {
+    double sum_a = 0.0, sum_b = 0.0;
+    for (std::size_t k = 0; k < all.size(); ++k)
+      (k < first ? sum_a : sum_b) += value_at(all[k], std::clamp(x, all[k].x.front(), all[k].x.back()));
+    out.push_back(sum_b / static_cast<double>(all.size() - first) - sum_a / static_cast<double>(first));
+  }
+  return out;
+}
+
+}  // namespace platen

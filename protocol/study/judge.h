@@ -1,0 +1,68 @@
+// What the statements are made of: finding curves by their powers, numbers with their scatter, bands.
+#pragma once
+
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "protocol/study/statements.h"
+
+namespace platen {
+
+inline constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
+
+struct Bounds {
+  double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
+};
+
+class Judge {
+ public:
+  Judge(const PartResults& part, std::vector<Statement>& out) : part_(part), out_(&out) {}
+
+  const PartResults& part() const { return part_; }
+
+  // Unvaried curves; nullptr where there is none or none of its runs is done.
+  const MeasuredCurve* reference() const;
+  const MeasuredCurve* scaled(double radius, std::optional<double> a, std::optional<double> b) const;
+  std::vector<double> radii() const;                 // of unvaried curves, without the reference's, increasing
+  std::vector<const MeasuredCurve*> plain() const;   // all unvaried curves with runs
+  bool is_plain(const MeasuredCurve& curve) const;   // nothing but radius and powers differs from the base
+
+  // Mean over seeds of a scalar; NaN for nullptr and where no run has it.
+  static double mean(const MeasuredCurve* curve, const std::string& scalar);
+  static double deviation(const MeasuredCurve* curve, const std::string& scalar);  // over seeds; NaN below two
+  static std::string shown(const MeasuredCurve* curve, const std::string& scalar, double scale, int decimals);
+
+  // A number that must lie in a band.
+  void number(const std::string& figure, const std::string& text, double value, Bounds bounds, int decimals,
+              const std::string& unit = "", double scale = 1.0);
+  void say(const std::string& figure, const std::string& text, const std::string& number, std::optional<bool> holds);
+  void missing(const std::string& figure, const std::string& text) { say(figure, text, "no data", std::nullopt); }
+
+  // RMS distance, unit of the observable, between the means of two curves; NaN without data.
+  static double distance(const MeasuredCurve* a, const MeasuredCurve* b, const std::string& observable);
+  // b - a on the common axis, of the means over seeds; empty without data.
+  static std::vector<double> difference(const MeasuredCurve* a, const std::string& of_a, const MeasuredCurve* b,
+                                        const std::string& of_b);
+
+ private:
+  const PartResults& part_;
+  std::vector<Statement>* out_;
+};
+
+std::string size_text(double radius);  // "R = 3.75 mm"
+
+// One group each.
+void judge_figures_4_7(Judge& judge);
+void judge_figures_8_10(Judge& judge);
+void judge_figure_11(Judge& judge, const StudyPlan& plan);
+void judge_figures_12_14(Judge& judge);
+void judge_quasi_static(Judge& judge);
+void judge_similarity_2(Judge& judge);
+void judge_similarity_3(Judge& judge);
+void judge_cross_checks(Judge& judge);
+void judge_scans(Judge& judge);
+
+}  // namespace platen
