@@ -15,7 +15,7 @@ namespace platen::bench {
 
 namespace {
 
-constexpr int bed_version = 2;          // of the recipe: part of the names in the cache
+constexpr int bed_version = 2;            // of the recipe: part of the names in the cache
 constexpr double wanted_contacts = 6.18;  // Z while settling; rest and load by the plate bring it to 6.2-6.3
 
 void say(const std::string& text) { fmt::print(stderr, "  bed: {}\n", text); }
@@ -133,7 +133,8 @@ void write_cached(const std::filesystem::path& file, const Bed& bed) {
     const double head[7] = {static_cast<double>(bed.size()), bed.R, bed.density, bed.width, bed.depth, bed.height, 0.0};
     out.write(reinterpret_cast<const char*>(head), sizeof head);
     for (const auto* column : {&bed.position, &bed.velocity, &bed.spin})
-      out.write(reinterpret_cast<const char*>(column->data()), static_cast<std::streamsize>(column->size() * sizeof(double)));
+      out.write(reinterpret_cast<const char*>(column->data()),
+                static_cast<std::streamsize>(column->size() * sizeof(double)));
     if (!out.flush()) throw std::runtime_error("cannot write " + part.string());
   }
   std::filesystem::rename(part, file);  // whole or not at all
@@ -181,16 +182,20 @@ Bed rain_bed(std::int64_t particles, const std::filesystem::path& cache) {
 
 void write_lammps(const Bed& bed, const std::filesystem::path& file) {
   std::ofstream out(file);
-  out << fmt::format("bed of a platen bench\n\n{} atoms\n1 atom types\n\n0 {:.17g} xlo xhi\n0 {:.17g} ylo yhi\n"
-                     "0 {:.17g} zlo zhi\n\nAtoms\n\n", bed.size(), bed.width, bed.depth, bed.height);
+  out << fmt::format(
+      "bed of a platen bench\n\n{} atoms\n1 atom types\n\n0 {:.17g} xlo xhi\n0 {:.17g} ylo yhi\n"
+      "0 {:.17g} zlo zhi\n\nAtoms\n\n",
+      bed.size(), bed.width, bed.depth, bed.height);
   for (std::size_t k = 0; k < bed.size(); ++k) {
     const double* x = &bed.position[3 * k];
-    out << fmt::format("{} 1 {:.17g} {:.17g} {:.17g} {:.17g} {:.17g}\n", k + 1, 2.0 * bed.R, bed.density, x[0], x[1], x[2]);
+    out << fmt::format("{} 1 {:.17g} {:.17g} {:.17g} {:.17g} {:.17g}\n", k + 1, 2.0 * bed.R, bed.density, x[0], x[1],
+                       x[2]);
   }
   out << "\nVelocities\n\n";
   for (std::size_t k = 0; k < bed.size(); ++k) {
     const double *v = &bed.velocity[3 * k], *w = &bed.spin[3 * k];
-    out << fmt::format("{} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g}\n", k + 1, v[0], v[1], v[2], w[0], w[1], w[2]);
+    out << fmt::format("{} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g}\n", k + 1, v[0], v[1], v[2], w[0], w[1],
+                       w[2]);
   }
   if (!out.flush()) throw std::runtime_error("cannot write " + file.string());
 }

@@ -17,10 +17,10 @@
 namespace platen::bench {
 
 struct Bed {
-  double R = 0.0;                               // [m]
-  double density = 0.0;                         // [kg/m3]
+  double R = 0.0;                                 // [m]
+  double density = 0.0;                           // [kg/m3]
   double width = 0.0, depth = 0.0, height = 0.0;  // periodic lengths, gap between the plates [m]
-  std::vector<double> position, velocity, spin; // N x 3 [m, m/s, rad/s]
+  std::vector<double> position, velocity, spin;   // N x 3 [m, m/s, rad/s]
   std::size_t size() const { return position.size() / 3; }
 };
 
@@ -42,10 +42,10 @@ Bed rain_bed(std::int64_t particles, const std::filesystem::path& cache);
 struct BenchScene {
   std::string name;
   PairLaw law;
-  double spread = 0.0;        // of radii: (1 - spread) R to R
-  bool plates = true;         // bottom and top plate, the top one moving down with 10 mm/s
-  bool top = true;            // false: no top plate (rain)
-  bool walls = false;         // rigid walls one radius outside the periodic box
+  double spread = 0.0;  // of radii: (1 - spread) R to R
+  bool plates = true;   // bottom and top plate, the top one moving down with 10 mm/s
+  bool top = true;      // false: no top plate (rain)
+  bool walls = false;   // rigid walls one radius outside the periodic box
   bool periodic = true;
   bool energy = true;
   bool reproducible = false;
@@ -59,9 +59,11 @@ BenchScene bench_scene(const std::string& name);
 struct BenchEngine {
   InstructionSet set = InstructionSet::scalar;
   int threads = 1;
-  int batch = 0;
+  int batch = 0;                 // particles; 0 = chosen, here and below
+  double skin = 0.0, gap = 0.0;  // [m]
+  int unroll = 0;                // most steps between two looks at the lists
   Executor executor = Executor::automatic;
-  bool fused = false;         // one task per batch and step
+  bool fused = false;  // one task per batch and step
 };
 
 // A Simulation ready to advance, with dt and planes set, as `platen run` sets them up.

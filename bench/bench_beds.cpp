@@ -26,8 +26,8 @@ int main(int argc, char** argv) {
     for (const std::int64_t n : rain) bed = rain_bed(n, beds);
     if (!lammps.empty()) write_lammps(bed, lammps);
     if (!csv.empty()) write_particles(bed, csv);
-    fmt::print("{{\"particles\": {}, \"radius\": {}, \"width\": {}, \"depth\": {}, \"height\": {}}}\n", bed.size(), bed.R,
-               bed.width, bed.depth, bed.height);
+    fmt::print("{{\"particles\": {}, \"radius\": {}, \"width\": {}, \"depth\": {}, \"height\": {}}}\n", bed.size(),
+               bed.R, bed.width, bed.depth, bed.height);
   } catch (const std::exception& error) {
     fmt::print(stderr, "bench_beds: {}\n", error.what());
     return 2;

@@ -13,8 +13,8 @@
 #include <exception>
 #include <map>
 
-#include "bench/list_copies.h"
 #include "bench/beds.h"
+#include "bench/list_copies.h"
 #include "bench/reference_loops.h"
 #include "core/float_mode.h"
 
@@ -134,24 +134,28 @@ void plates(benchmark::State& state, InstructionSet set) {
   }
   if (totals.out_of_range) state.SkipWithError("forces out of range");
   // Index, row, four columns read and written, a record and the overlap written.
-  finish(state, static_cast<double>(used), static_cast<double>(used) * (4 + 8.0 * (row_size + 2 * 4 + record_size + 1)), "sphere");
+  finish(state, static_cast<double>(used), static_cast<double>(used) * (4 + 8.0 * (row_size + 2 * 4 + record_size + 1)),
+         "sphere");
 }
 
 void add_all() {
-  const std::vector<std::string> names = {"linear", "no_adhesion", "full", "no_energy", "unequal_radii", "three_halves",
+  const std::vector<std::string> names = {"linear",       "no_adhesion",      "full",
+                                          "no_energy",    "unequal_radii",    "three_halves",
                                           "any_exponent", "relative_rolling", "reproducible"};
   for (const InstructionSet set : available_instruction_sets()) {
     for (const std::string& name : names)
       for (const List list : {List::l1, List::l2, List::l3}) {
         const BenchScene scene = bench_scene(name);
         if (list != List::l2 && name != "full" && name != "linear") continue;  // the cache matters once
-        benchmark::RegisterBenchmark(fmt::format("contacts/{}/{}/{}", to_string(set), name, list_names[static_cast<int>(list)]).c_str(),
-                                     contacts, set, scene, list);
+        benchmark::RegisterBenchmark(
+            fmt::format("contacts/{}/{}/{}", to_string(set), name, list_names[static_cast<int>(list)]).c_str(),
+            contacts, set, scene, list);
       }
     for (const List list : {List::l1, List::l2, List::l3})
       for (const char* name : {"full", "unequal_radii"})
-        benchmark::RegisterBenchmark(fmt::format("motion/{}/{}/{}", to_string(set), name, list_names[static_cast<int>(list)]).c_str(),
-                                     motion, set, bench_scene(name), list);
+        benchmark::RegisterBenchmark(
+            fmt::format("motion/{}/{}/{}", to_string(set), name, list_names[static_cast<int>(list)]).c_str(), motion,
+            set, bench_scene(name), list);
     benchmark::RegisterBenchmark(fmt::format("plates/{}", to_string(set)).c_str(), plates, set);
   }
 }
@@ -160,21 +164,24 @@ void add_all() {
 
 int main(int argc, char** argv) {
   const char* folder = std::getenv("PLATEN_BENCH_BEDS");
-  beds = folder != nullptr ? std::filesystem::path(folder) : std::filesystem::temp_directory_path() / "platen-bench-beds";
+  beds =
+      folder != nullptr ? std::filesystem::path(folder) : std::filesystem::temp_directory_path() / "platen-bench-beds";
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
   try {
     const auto note = [](const char* when, InstructionSet set) {
       const ReferenceLoops loops = reference_loops(set);
-      benchmark::AddCustomContext(fmt::format("reference_{}_{}", to_string(set), when),
-                                  fmt::format("FMA {:.1f} Gflop/s, L2 {:.0f} GB/s, L3 {:.0f} GB/s", loops.fma, loops.l2, loops.l3));
+      benchmark::AddCustomContext(
+          fmt::format("reference_{}_{}", to_string(set), when),
+          fmt::format("FMA {:.1f} Gflop/s, L2 {:.0f} GB/s, L3 {:.0f} GB/s", loops.fma, loops.l2, loops.l3));
     };
     for (const InstructionSet set : available_instruction_sets()) note("at_start", set);
     add_all();
     benchmark::RunSpecifiedBenchmarks();
     for (const InstructionSet set : available_instruction_sets()) {
       const ReferenceLoops loops = reference_loops(set);
-      fmt::print(stderr, "at the end, {}: FMA {:.1f} Gflop/s, L2 {:.0f} GB/s, L3 {:.0f} GB/s\n", to_string(set), loops.fma, loops.l2, loops.l3);
+      fmt::print(stderr, "at the end, {}: FMA {:.1f} Gflop/s, L2 {:.0f} GB/s, L3 {:.0f} GB/s\n", to_string(set),
+                 loops.fma, loops.l2, loops.l3);
     }
   } catch (const std::exception& error) {
     fmt::print(stderr, "bench_kernels: {}\n", error.what());

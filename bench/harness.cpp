@@ -71,7 +71,8 @@ std::vector<Timing> run_in_turn(const std::vector<Variant>& variants, int rounds
     std::vector<double> taken(n);
     const std::uint64_t before = stolen_ticks();
     for (std::size_t k = 0; k < n; ++k) {
-      const std::size_t which = round % 2 == 0 ? k : n - 1 - k;  // a b, b a, a b ...: no place in the row has an advantage
+      const std::size_t which =
+          round % 2 == 0 ? k : n - 1 - k;  // a b, b a, a b ...: no place in the row has an advantage
       taken[which] = variants[which].run();
     }
     const bool stolen = stolen_ticks() != before;
@@ -127,8 +128,8 @@ void write_json(const std::string& path, const std::string& bench, const Table& 
   char date[32];
   const std::time_t now = std::time(nullptr);
   std::strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", std::gmtime(&now));
-  const nlohmann::json all = {{"bench", bench}, {"title", table.title()}, {"processor", processor_name()},
-                              {"compiler", __VERSION__}, {"date", date}, {"rows", table.rows()}};
+  const nlohmann::json all = {{"bench", bench},          {"title", table.title()}, {"processor", processor_name()},
+                              {"compiler", __VERSION__}, {"date", date},           {"rows", table.rows()}};
   file << all.dump(1) << "\n";
   if (!file.flush()) throw std::runtime_error("cannot write " + path);
 }

@@ -13,22 +13,22 @@
 
 namespace platen::bench {
 
-double seconds_now();             // monotonic [s]
-std::uint64_t stolen_ticks();     // all processors; 0 where the system does not say
+double seconds_now();          // monotonic [s]
+std::uint64_t stolen_ticks();  // all processors; 0 where the system does not say
 double seconds_of(const std::function<void()>& work);
 double median(std::vector<double> values);  // NaN without any
-double resident_bytes();           // of this process, after freed memory went back to the system; NaN where unknown
-std::string processor_name();     // model name of /proc/cpuinfo
+double resident_bytes();       // of this process, after freed memory went back to the system; NaN where unknown
+std::string processor_name();  // model name of /proc/cpuinfo
 
 struct Variant {
   std::string name;
-  std::function<double()> run;    // one block; returns the seconds that count
+  std::function<double()> run;  // one block; returns the seconds that count
 };
 
 struct Timing {
-  std::vector<double> seconds;    // of the rounds that count
-  int dropped = 0;                // rounds with steal
-  bool steal_kept = false;        // every round had steal: they were kept all the same
+  std::vector<double> seconds;  // of the rounds that count
+  int dropped = 0;              // rounds with steal
+  bool steal_kept = false;      // every round had steal: they were kept all the same
   double typical() const { return median(seconds); }
   double best() const;
 };
@@ -42,16 +42,16 @@ double median_ratio(const Timing& a, const Timing& b);
 
 // A table printed row by row as it grows; the rows, with everything in them, are kept for the JSON file.
 struct Column {
-  std::string key;      // of the row's JSON object
+  std::string key;  // of the row's JSON object
   std::string heading;
   int width = 10;
-  int digits = 2;       // behind the point, of numbers that are not integers
+  int digits = 2;  // behind the point, of numbers that are not integers
 };
 
 class Table {
  public:
   Table(std::string title, std::vector<Column> columns);
-  void add(nlohmann::json row);   // prints it
+  void add(nlohmann::json row);  // prints it
   const nlohmann::json& rows() const { return rows_; }
   const std::string& title() const { return title_; }
 

@@ -5,20 +5,43 @@
 namespace platen::bench {
 
 StateCopy::StateCopy(const Particles& p)
-    : x(copy_of(p.x)), y(copy_of(p.y)), z(copy_of(p.z)), vx(copy_of(p.vx)), vy(copy_of(p.vy)), vz(copy_of(p.vz)),
-      ux(copy_of(p.ux)), uy(copy_of(p.uy)), uz(copy_of(p.uz)), inverse_mass(copy_of(p.inverse_mass)),
-      mass(copy_of(p.mass)), radius(copy_of(p.radius)), inverse_radius(copy_of(p.inverse_radius)),
-      rows(copy_of(p.rows)), image(copy_of(p.image)) {}
+    : x(copy_of(p.x)),
+      y(copy_of(p.y)),
+      z(copy_of(p.z)),
+      vx(copy_of(p.vx)),
+      vy(copy_of(p.vy)),
+      vz(copy_of(p.vz)),
+      ux(copy_of(p.ux)),
+      uy(copy_of(p.uy)),
+      uz(copy_of(p.uz)),
+      inverse_mass(copy_of(p.inverse_mass)),
+      mass(copy_of(p.mass)),
+      radius(copy_of(p.radius)),
+      inverse_radius(copy_of(p.inverse_radius)),
+      rows(copy_of(p.rows)),
+      image(copy_of(p.image)) {}
 
 PlateBatch PlateCopy::view(const StateCopy& state) {
-  return {state.rows.data(), particle.data(), xi_x.data(), xi_y.data(), xi_z.data(), stiffness_last.data(),
-          records.data(), overlap.data(), padded, used};
+  return {state.rows.data(),     particle.data(), xi_x.data(),    xi_y.data(), xi_z.data(),
+          stiffness_last.data(), records.data(),  overlap.data(), padded,      used};
 }
 
 BatchCopy::BatchCopy(const Batch& b)
-    : i(copy_of(b.i)), j(copy_of(b.j)), slot_j(copy_of(b.slot_j)), sp(copy_of(b.sp)), tx(copy_of(b.tx)),
-      ty(copy_of(b.ty)), tz(copy_of(b.tz)), k_t_last(copy_of(b.k_t_last)), sum_i(copy_of(b.sum_i)),
-      sum_j(copy_of(b.sum_j)), first(b.first), count(b.count), used(b.used), padded(b.padded), incoming(b.incoming) {
+    : i(copy_of(b.i)),
+      j(copy_of(b.j)),
+      slot_j(copy_of(b.slot_j)),
+      sp(copy_of(b.sp)),
+      tx(copy_of(b.tx)),
+      ty(copy_of(b.ty)),
+      tz(copy_of(b.tz)),
+      k_t_last(copy_of(b.k_t_last)),
+      sum_i(copy_of(b.sum_i)),
+      sum_j(copy_of(b.sum_j)),
+      first(b.first),
+      count(b.count),
+      used(b.used),
+      padded(b.padded),
+      incoming(b.incoming) {
   for (int plate = 0; plate < plate_count; ++plate) {
     const PlateList& from = b.plates[plate];
     if (from.used == 0) continue;
@@ -50,14 +73,30 @@ PairBatch BatchCopy::pairs(const StateCopy& state) {
 MotionBatch BatchCopy::motion(StateCopy& s) {
   const auto at = static_cast<std::size_t>(first);
   const auto column = [&](AlignedArray<double>& a) { return a.empty() ? nullptr : a.data() + at; };
-  return {column(s.x), column(s.y), column(s.z), column(s.vx), column(s.vy), column(s.vz), column(s.ux), column(s.uy),
-          column(s.uz), column(s.inverse_mass), column(s.mass), column(s.radius), column(s.inverse_radius),
-          s.rows.data() + row_size * at, s.image.data() + 2 * at, sum_i.data(), sum_j.data(), count};
+  return {column(s.x),
+          column(s.y),
+          column(s.z),
+          column(s.vx),
+          column(s.vy),
+          column(s.vz),
+          column(s.ux),
+          column(s.uy),
+          column(s.uz),
+          column(s.inverse_mass),
+          column(s.mass),
+          column(s.radius),
+          column(s.inverse_radius),
+          s.rows.data() + row_size * at,
+          s.image.data() + 2 * at,
+          sum_i.data(),
+          sum_j.data(),
+          count};
 }
 
 std::int64_t BatchCopy::list_bytes() const {
   const std::int64_t history = k_t_last.empty() ? 4 : 5;
-  return padded * static_cast<std::int64_t>(3 * sizeof(std::int32_t) + 2 * sizeof(double) * static_cast<std::size_t>(history));
+  return padded *
+         static_cast<std::int64_t>(3 * sizeof(std::int32_t) + 2 * sizeof(double) * static_cast<std::size_t>(history));
 }
 
 std::int64_t BatchCopy::row_bytes() const {

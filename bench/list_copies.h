@@ -36,7 +36,7 @@ struct BatchCopy {
   AlignedArray<double> sp, tx, ty, tz, k_t_last, sum_i, sum_j;
   std::int32_t first = 0, count = 0, used = 0, padded = 0;
   std::vector<Incoming> incoming;
-  std::vector<PlateCopy> plates;   // those with spheres near them
+  std::vector<PlateCopy> plates;  // those with spheres near them
   PairBatch pairs(const StateCopy& state);
   MotionBatch motion(StateCopy& state);
   // What a pass reads and writes [bytes]: lists and history, rows of the spheres that occur, sums.

@@ -25,7 +25,8 @@ ParallelForStep::ParallelForStep(const Simulation& sim, const PairLaw& law, doub
 // As Simulation::merge.
 void ParallelForStep::merge(BatchCopy& b) {
   for (const Incoming& in : b.incoming) {
-    const double* from = batches_[static_cast<std::size_t>(in.batch)].sum_j.data() + record_size * static_cast<std::size_t>(in.slot);
+    const double* from =
+        batches_[static_cast<std::size_t>(in.batch)].sum_j.data() + record_size * static_cast<std::size_t>(in.slot);
     double* to = b.sum_j.data() + record_size * static_cast<std::size_t>(in.local);
     for (int k = 0; k < record_size; ++k) to[k] += from[k];
   }

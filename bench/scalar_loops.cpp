@@ -20,10 +20,14 @@ std::int64_t scalar_forces(const ScalarBed& bed, const ScalarConstants& c, doubl
       ScalarHistory& h = bed.history[k];
       double dx = a.x[0] - b.x[0], dy = a.x[1] - b.x[1];
       const double dz = a.x[2] - b.x[2];
-      if (dx > half_width) dx -= c.width;
-      else if (dx < -half_width) dx += c.width;
-      if (dy > half_depth) dy -= c.depth;
-      else if (dy < -half_depth) dy += c.depth;
+      if (dx > half_width)
+        dx -= c.width;
+      else if (dx < -half_width)
+        dx += c.width;
+      if (dy > half_depth)
+        dy -= c.depth;
+      else if (dy < -half_depth)
+        dy += c.depth;
       const double distance2 = dx * dx + dy * dy + dz * dz;
       if (distance2 >= reach2) {
         if (h.sp != 0.0 || h.T[0] != 0.0 || h.T[1] != 0.0 || h.T[2] != 0.0) {  // parted in this step: history ends
@@ -86,7 +90,8 @@ std::int64_t scalar_forces(const ScalarBed& bed, const ScalarConstants& c, doubl
       h.sp = sp, h.T[0] = sx, h.T[1] = sy, h.T[2] = sz;
 
       const double gx = Fx + f_n * nx, gy = Fy + f_n * ny, gz = Fz + f_n * nz;
-      const double mx = -lever * (ny * Fz - nz * Fy), my = -lever * (nz * Fx - nx * Fz), mz = -lever * (nx * Fy - ny * Fx);
+      const double mx = -lever * (ny * Fz - nz * Fy), my = -lever * (nz * Fx - nx * Fz),
+                   mz = -lever * (nx * Fy - ny * Fx);
       const double strength = std::fabs(f_hys) * lever;
       sum.F[0] += gx, sum.F[1] += gy, sum.F[2] += gz;
       sum.T[0] += mx, sum.T[1] += my, sum.T[2] += mz;
@@ -134,8 +139,8 @@ void scalar_plate_forces(const ScalarBed& bed, const ScalarConstants& c, const S
       ledger.sliding += 0.5 * (S_last * slip_old + S_t * (1.0 - back) * back * trial2);
     }
     const double xi_x = back * trial_x, xi_y = back * trial_y;
-    ledger.viscous += (0.75 * c_n + 0.25 * c_n_last) * dt * v_n * v_n +
-                      (0.75 * c_t + 0.25 * c_t_before) * dt * (tx * tx + ty * ty);
+    ledger.viscous +=
+        (0.75 * c_n + 0.25 * c_n_last) * dt * v_n * v_n + (0.75 * c_t + 0.25 * c_t_before) * dt * (tx * tx + ty * ty);
     ledger.model += 0.5 * (contact.xi[0] * xi_x + contact.xi[1] * xi_y) * (S_t - S_last);
     contact.xi[0] = xi_x, contact.xi[1] = xi_y, contact.stiffness_last = S_t;
     const double Fx = -S_t * xi_x - c_t * tx, Fy = -S_t * xi_y - c_t * ty, Fz = n * (F_s - c_n * v_n);
@@ -164,10 +169,14 @@ double scalar_motion(const ScalarBed& bed, const ScalarConstants& c, double kick
     rolling += 0.2 * c.m * u2 * (1.0 - left * left);
     for (int axis = 0; axis < 3; ++axis) s.u[axis] *= left;
     for (int axis = 0; axis < 3; ++axis) s.x[axis] += drift * s.v[axis];
-    if (s.x[0] < 0.0) s.x[0] += c.width;
-    else if (s.x[0] >= c.width) s.x[0] -= c.width;
-    if (s.x[1] < 0.0) s.x[1] += c.depth;
-    else if (s.x[1] >= c.depth) s.x[1] -= c.depth;
+    if (s.x[0] < 0.0)
+      s.x[0] += c.width;
+    else if (s.x[0] >= c.width)
+      s.x[0] -= c.width;
+    if (s.x[1] < 0.0)
+      s.x[1] += c.depth;
+    else if (s.x[1] >= c.depth)
+      s.x[1] -= c.depth;
     const double speed2 = s.v[0] * s.v[0] + s.v[1] * s.v[1] + s.v[2] * s.v[2];
     largest = speed2 > largest ? speed2 : largest;
   }

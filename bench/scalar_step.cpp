@@ -62,7 +62,8 @@ ScalarStep::ScalarStep(const Bed& bed, const BenchScene& scene) {
 }
 
 ScalarBed ScalarStep::view() {
-  return {spheres_.data(), sums_.data(), start_.data(), partner_.data(), history_.data(), static_cast<std::int32_t>(spheres_.size())};
+  return {spheres_.data(), sums_.data(),    start_.data(),
+          partner_.data(), history_.data(), static_cast<std::int32_t>(spheres_.size())};
 }
 
 // A cell list, then every pair closer than 2R + skin once, with the history of pairs that were listed before.
@@ -73,13 +74,15 @@ void ScalarStep::rebuild() {
   const double extent[3] = {c_.width, c_.depth, std::max(high - low, reach)}, origin[3] = {0.0, 0.0, low};
   int cells[3];
   for (int axis = 0; axis < 3; ++axis) cells[axis] = std::max(1, static_cast<int>(extent[axis] / reach));
-  if (cells[0] < 3 || cells[1] < 3) throw std::invalid_argument("the scalar step wants a box at least three cells wide");
+  if (cells[0] < 3 || cells[1] < 3)
+    throw std::invalid_argument("the scalar step wants a box at least three cells wide");
   const auto cell = [&](const ScalarSphere& s, int axis) {
     return std::clamp(static_cast<int>((s.x[axis] - origin[axis]) / extent[axis] * cells[axis]), 0, cells[axis] - 1);
   };
   const auto index = [&](int a, int b, int d) {
     return (static_cast<std::size_t>(d) * static_cast<std::size_t>(cells[1]) + static_cast<std::size_t>(b)) *
-               static_cast<std::size_t>(cells[0]) + static_cast<std::size_t>(a);
+               static_cast<std::size_t>(cells[0]) +
+           static_cast<std::size_t>(a);
   };
   const auto n = static_cast<std::int32_t>(spheres_.size());
   std::vector<std::int32_t> head(index(cells[0] - 1, cells[1] - 1, cells[2] - 1) + 1, -1), next(spheres_.size(), -1);
@@ -104,7 +107,8 @@ void ScalarStep::rebuild() {
           for (std::int32_t j = head[index(x, y, dz)]; j >= 0; j = next[static_cast<std::size_t>(j)]) {
             if (j <= i) continue;
             const ScalarSphere& b = spheres_[static_cast<std::size_t>(j)];
-            const double ex = nearest(a.x[0] - b.x[0], c_.width), ey = nearest(a.x[1] - b.x[1], c_.depth), ez = a.x[2] - b.x[2];
+            const double ex = nearest(a.x[0] - b.x[0], c_.width), ey = nearest(a.x[1] - b.x[1], c_.depth),
+                         ez = a.x[2] - b.x[2];
             if (ex * ex + ey * ey + ez * ez < reach2) close.push_back(j);
           }
         }
@@ -121,7 +125,8 @@ void ScalarStep::rebuild() {
   start_.swap(start), partner_.swap(partner), history_.swap(history);
 
   for (int plate = 0; plates_ && plate < 2; ++plate) {
-    const double position = plate_origin_[plate] + plate_velocity_[plate] * static_cast<double>(step_) * bench_step_size;
+    const double position =
+        plate_origin_[plate] + plate_velocity_[plate] * static_cast<double>(step_) * bench_step_size;
     std::vector<ScalarPlateContact> contacts, &before = plate_contacts_[plate];
     auto old = before.begin();
     for (std::int32_t k = 0; k < n; ++k) {
@@ -132,7 +137,8 @@ void ScalarStep::rebuild() {
     before.swap(contacts);
   }
   at_rebuild_.resize(3 * spheres_.size());
-  for (std::size_t k = 0; k < spheres_.size(); ++k) std::copy_n(spheres_[k].x, 3, at_rebuild_.begin() + 3 * static_cast<std::ptrdiff_t>(k));
+  for (std::size_t k = 0; k < spheres_.size(); ++k)
+    std::copy_n(spheres_[k].x, 3, at_rebuild_.begin() + 3 * static_cast<std::ptrdiff_t>(k));
   moved_ = plate_moved_ = 0.0;
   ++rebuilds_;
 }
@@ -143,10 +149,9 @@ void ScalarStep::forces(double dt) {
   if (!plates_) return;
   std::fill(rolling_strength_.begin(), rolling_strength_.end(), 0.0);
   for (int k = 0; k < 2; ++k) {
-    const ScalarPlate plate = {k == 0 ? 1.0 : -1.0,
-                               plate_origin_[k] + plate_velocity_[k] * static_cast<double>(step_) * bench_step_size,
-                               plate_velocity_[k], plate_contacts_[k].data(),
-                               static_cast<std::int32_t>(plate_contacts_[k].size())};
+    const ScalarPlate plate = {
+        k == 0 ? 1.0 : -1.0, plate_origin_[k] + plate_velocity_[k] * static_cast<double>(step_) * bench_step_size,
+        plate_velocity_[k], plate_contacts_[k].data(), static_cast<std::int32_t>(plate_contacts_[k].size())};
     scalar_plate_forces(bed, c_, plate, dt, rolling_strength_.data(), ledger_);
   }
 }
@@ -179,8 +184,7 @@ double ScalarStep::displaced() const {
 
 std::vector<double> ScalarStep::positions() const {
   std::vector<double> all(3 * spheres_.size());
-  for (std::size_t k = 0; k < spheres_.size(); ++k)
-    std::copy_n(spheres_[k].x, 3, all.begin() + 3 * order_[k]);
+  for (std::size_t k = 0; k < spheres_.size(); ++k) std::copy_n(spheres_[k].x, 3, all.begin() + 3 * order_[k]);
   return all;
 }
 

@@ -35,7 +35,7 @@ class ScalarStep {
   ScalarBed view();
 
   ScalarConstants c_{};
-  std::vector<std::int32_t> order_;      // order_[place] = number in the bed
+  std::vector<std::int32_t> order_;  // order_[place] = number in the bed
   std::vector<ScalarSphere> spheres_;
   std::vector<ScalarSum> sums_;
   std::vector<double> rolling_strength_;  // of plates [N]

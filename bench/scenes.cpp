@@ -86,6 +86,8 @@ std::unique_ptr<Simulation> make_simulation(const Bed& bed, const BenchScene& sc
   setup.engine.instruction_set = engine.set;
   setup.engine.threads = engine.threads;
   setup.engine.batch = engine.batch;
+  setup.engine.skin = engine.skin, setup.engine.inner_gap = engine.gap;
+  if (engine.unroll > 0) setup.engine.unroll = engine.unroll;
   setup.engine.executor = engine.executor;
   setup.engine.fused = engine.fused;
   setup.engine.energy = scene.energy;

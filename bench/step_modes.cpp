@@ -41,11 +41,15 @@ std::int64_t listed_pairs(const Simulation& sim) {
 nlohmann::json row_of(Simulation& sim, const BenchScene& scene, int threads) {
   const Measures now = sim.measure(false);
   const auto n = static_cast<double>(sim.particles());
-  return {{"particles", sim.particles()}, {"scene", scene.name},
+  return {{"particles", sim.particles()},
+          {"scene", scene.name},
           {"kernels", built_scenes[static_cast<std::size_t>(sim.kernels().scene)].name},
-          {"set", to_string(sim.kernels().instruction_set)}, {"threads", threads},
-          {"Z", now.coordination_number}, {"contacts", static_cast<double>(now.contacts) / n},
-          {"listed", static_cast<double>(listed_pairs(sim)) / n}, {"batches", sim.counters().batches}};
+          {"set", to_string(sim.kernels().instruction_set)},
+          {"threads", threads},
+          {"Z", now.coordination_number},
+          {"contacts", static_cast<double>(now.contacts) / n},
+          {"listed", static_cast<double>(listed_pairs(sim)) / n},
+          {"batches", sim.counters().batches}};
 }
 
 void add_time(nlohmann::json& row, Simulation& sim, const Timing& timing, std::int64_t steps, int threads) {
@@ -66,12 +70,6 @@ Variant stepping(const std::string& name, Simulation& sim, std::int64_t steps) {
   return {name, [&sim, steps] { return seconds_of([&] { sim.advance(steps); }); }};
 }
 
-BenchEngine engine_of(const StepOptions& o, InstructionSet set, int threads) {
-  BenchEngine engine;
-  engine.set = set, engine.threads = threads, engine.batch = o.batch;
-  return engine;
-}
-
 const Column particles_column{"particles", "particles", 10, 0}, set_column{"set", "isa", 8, 0},
     scene_column{"scene", "scene", 17, 0}, z_column{"Z", "Z", 7, 2}, fma_column{"fma", "FMA Gf/s", 10, 1},
     l2_column{"l2", "L2 GB/s", 9, 0}, l3_column{"l3", "L3 GB/s", 9, 0}, state_column{"state", "state", 7, 2},
@@ -79,11 +77,31 @@ const Column particles_column{"particles", "particles", 10, 0}, set_column{"set"
 
 }  // namespace
 
+BenchEngine engine_of(const StepOptions& o, InstructionSet set, int threads) {
+  BenchEngine engine;
+  engine.set = set, engine.threads = threads, engine.batch = o.batch, engine.unroll = o.unroll;
+  engine.skin = o.skin * bench_radius, engine.gap = o.gap * bench_radius;
+  return engine;
+}
+
 void table_of_steps(const StepOptions& o) {
-  Table table("Whole step, M particle-steps/s",
-              {particles_column, scene_column, {"threads", "threads", 8, 0}, set_column, {"rate", "M/s"}, {"best", "best"},
-               {"ns", "ns/contact", 12}, z_column, {"contacts", "c/particle", 11}, {"listed", "listed", 8}, {"rebuilds", "rebuilds"},
-               {"memory", "B/particle", 11, 0}, fma_column, l2_column, l3_column, state_column, hash_column});
+  Table table("Whole step, M particle-steps/s", {particles_column,
+                                                 scene_column,
+                                                 {"threads", "threads", 8, 0},
+                                                 set_column,
+                                                 {"rate", "M/s"},
+                                                 {"best", "best"},
+                                                 {"ns", "ns/contact", 12},
+                                                 z_column,
+                                                 {"contacts", "c/particle", 11},
+                                                 {"listed", "listed", 8},
+                                                 {"rebuilds", "rebuilds"},
+                                                 {"memory", "B/particle", 11, 0},
+                                                 fma_column,
+                                                 l2_column,
+                                                 l3_column,
+                                                 state_column,
+                                                 hash_column});
   for (const std::int64_t particles : either(o.particles, {5000, 35000})) {
     const Bed bed = dense_bed(particles, o.beds);
     for (const std::string& name : either(o.scenes, {"full"}))
@@ -109,10 +127,20 @@ void table_of_steps(const StepOptions& o) {
 }
 
 void table_of_threads(const StepOptions& o) {
-  Table table("One thread against many, blocks in turn",
-              {particles_column, set_column, {"threads", "threads", 8, 0}, {"rate_one", "M/s, 1"}, {"rate", "M/s, many", 11},
-               {"speedup", "speed-up"}, {"rounds", "pairs", 7, 0}, {"dropped", "dropped", 9, 0}, {"same", "same bits"}, z_column,
-               fma_column, l2_column, l3_column, state_column});
+  Table table("One thread against many, blocks in turn", {particles_column,
+                                                          set_column,
+                                                          {"threads", "threads", 8, 0},
+                                                          {"rate_one", "M/s, 1"},
+                                                          {"rate", "M/s, many", 11},
+                                                          {"speedup", "speed-up"},
+                                                          {"rounds", "pairs", 7, 0},
+                                                          {"dropped", "dropped", 9, 0},
+                                                          {"same", "same bits"},
+                                                          z_column,
+                                                          fma_column,
+                                                          l2_column,
+                                                          l3_column,
+                                                          state_column});
   const std::vector<int> given = either(o.threads, {2});
   const int many = *std::max_element(given.begin(), given.end());
   for (const std::int64_t particles : either(o.particles, {35000, 280000, 1000000})) {
@@ -139,15 +167,26 @@ void table_of_threads(const StepOptions& o) {
 
 void table_of_features(const StepOptions& o) {
   Table table("What a feature costs: time of a scene over that of the full one, one thread, blocks in turn",
-              {particles_column, set_column, scene_column, {"kernels", "kernels", 18, 0}, {"rate", "M/s"},
-               {"relative", "time/full"}, {"ns", "ns/contact", 12}, z_column, {"listed", "listed", 8}, {"rebuilds", "rebuilds"},
-               fma_column, state_column, hash_column});
+              {particles_column,
+               set_column,
+               scene_column,
+               {"kernels", "kernels", 18, 0},
+               {"rate", "M/s"},
+               {"relative", "time/full"},
+               {"ns", "ns/contact", 12},
+               z_column,
+               {"listed", "listed", 8},
+               {"rebuilds", "rebuilds"},
+               fma_column,
+               state_column,
+               hash_column});
   for (const std::int64_t particles : either(o.particles, {35000})) {
     const Bed bed = dense_bed(particles, o.beds);
     for (const InstructionSet set : sets_of(o)) {
       std::vector<BenchScene> scenes;
       for (const BenchScene& scene : bench_scenes()) {
-        const bool asked = o.scenes.empty() || std::find(o.scenes.begin(), o.scenes.end(), scene.name) != o.scenes.end();
+        const bool asked =
+            o.scenes.empty() || std::find(o.scenes.begin(), o.scenes.end(), scene.name) != o.scenes.end();
         if (scene.top && (asked || scene.name == "full")) scenes.push_back(scene);
       }
       std::vector<std::unique_ptr<Simulation>> sims;
@@ -176,9 +215,20 @@ void table_of_features(const StepOptions& o) {
 
 bool table_of_scalar(const StepOptions& o) {
   Table table("platen on one thread against the plain scalar half-list step, blocks in turn",
-              {particles_column, scene_column, set_column, {"rate", "platen M/s", 12}, {"scalar", "scalar M/s", 12},
-               {"ratio", "ratio", 8}, {"agrees", "|dx|/R", 9, 0}, z_column, {"scalar_contacts", "scalar c", 10},
-               {"scalar_listed", "listed", 8}, fma_column, l2_column, l3_column, state_column});
+              {particles_column,
+               scene_column,
+               set_column,
+               {"rate", "platen M/s", 12},
+               {"scalar", "scalar M/s", 12},
+               {"ratio", "ratio", 8},
+               {"agrees", "|dx|/R", 9, 0},
+               z_column,
+               {"scalar_contacts", "scalar c", 10},
+               {"scalar_listed", "listed", 8},
+               fma_column,
+               l2_column,
+               l3_column,
+               state_column});
   if (!ScalarStep::available()) {
     fmt::print("  skipped: the yardstick is built for AVX2 and FMA, which this processor lacks\n");
     return true;
@@ -196,8 +246,8 @@ bool table_of_scalar(const StepOptions& o) {
         sim->advance(o.warm), scalar.advance(o.warm);
         const std::int64_t steps = steps_of(o, bed.size());
         const auto timings = run_in_turn(
-            {stepping("platen", *sim, steps),
-             {"scalar", [&] { return seconds_of([&] { scalar.advance(steps); }); }}}, o.rounds);
+            {stepping("platen", *sim, steps), {"scalar", [&] { return seconds_of([&] { scalar.advance(steps); }); }}},
+            o.rounds);
         nlohmann::json row = row_of(*sim, scene, 1);
         add_time(row, *sim, timings[0], steps, 1);
         const auto n = static_cast<double>(bed.size());
@@ -219,9 +269,16 @@ bool table_of_scalar(const StepOptions& o) {
 }
 
 void table_of_rebuilds(const StepOptions& o) {
-  Table table("A rebuild: Morton sort, outer and inner lists, history, graph",
-              {particles_column, {"threads", "threads", 8, 0}, {"wall", "ns/particle", 13, 0}, {"cpu", "cpu ns/particle", 17, 0},
-               z_column, {"listed", "listed", 8}, fma_column, l2_column, l3_column, state_column});
+  Table table("A rebuild: Morton sort, outer and inner lists, history, graph", {particles_column,
+                                                                                {"threads", "threads", 8, 0},
+                                                                                {"wall", "ns/particle", 13, 0},
+                                                                                {"cpu", "cpu ns/particle", 17, 0},
+                                                                                z_column,
+                                                                                {"listed", "listed", 8},
+                                                                                fma_column,
+                                                                                l2_column,
+                                                                                l3_column,
+                                                                                state_column});
   for (const std::int64_t particles : either(o.particles, {35000}))
     for (const int threads : either(o.threads, {1, 2})) {
       const Bed bed = dense_bed(particles, o.beds);
@@ -231,14 +288,17 @@ void table_of_rebuilds(const StepOptions& o) {
       sim->advance(32);
       constexpr int times = 4;
       std::vector<double> cpu;
-      const Timing timing = run_in_turn({{"rebuild", [&] {
+      const Timing timing = run_in_turn({{"rebuild",
+                                          [&] {
                                             const std::clock_t start = std::clock();
                                             const double seconds = seconds_of([&] {
                                               for (int k = 0; k < times; ++k) sim->rebuild_now();
                                             });
                                             cpu.push_back(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
                                             return seconds;
-                                          }}}, o.rounds).front();
+                                          }}},
+                                        o.rounds)
+                                .front();
       nlohmann::json row = row_of(*sim, scene, threads);
       const double each = 1e9 / (times * static_cast<double>(bed.size()));
       row["wall"] = each * timing.typical(), row["cpu"] = each * median(cpu);
@@ -250,9 +310,18 @@ void table_of_rebuilds(const StepOptions& o) {
 
 bool table_of_executors(const StepOptions& o) {
   Table table("The flow graph against two parallel_for a step, blocks in turn, M particle-steps/s",
-              {particles_column, set_column, {"threads", "threads", 8, 0}, {"split", "graph"}, {"fused", "fused"},
-               {"rate", "parallel_for", 14}, {"ratio", "graph/p_for", 12}, {"same", "same bits"}, z_column, {"batches", "batches"},
-               fma_column, state_column});
+              {particles_column,
+               set_column,
+               {"threads", "threads", 8, 0},
+               {"split", "graph"},
+               {"fused", "fused"},
+               {"rate", "parallel_for", 14},
+               {"ratio", "graph/p_for", 12},
+               {"same", "same bits"},
+               z_column,
+               {"batches", "batches"},
+               fma_column,
+               state_column});
   bool right = true;
   for (const std::int64_t particles : either(o.particles, {5000, 35000, 280000})) {
     const Bed bed = dense_bed(particles, o.beds);
@@ -274,9 +343,11 @@ bool table_of_executors(const StepOptions& o) {
         const bool same = comparable && loops.same_bits(*split);
         right = right && (same || !comparable);
         const std::int64_t steps = steps_of(o, bed.size());
-        const auto timings = run_in_turn(
-            {stepping("split", *split, steps), stepping("fused", *fused, steps),
-             {"loops", [&] { return seconds_of([&] { loops.advance(static_cast<int>(steps)); }); }}}, o.rounds);
+        const auto timings =
+            run_in_turn({stepping("split", *split, steps),
+                         stepping("fused", *fused, steps),
+                         {"loops", [&] { return seconds_of([&] { loops.advance(static_cast<int>(steps)); }); }}},
+                        o.rounds);
         nlohmann::json row = row_of(*split, scene, threads);
         add_time(row, *split, timings[2], steps, threads);
         row["split"] = rate(bed.size(), steps, timings[0].typical());

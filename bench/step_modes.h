@@ -11,18 +11,21 @@
 namespace platen::bench {
 
 struct StepOptions {
-  std::vector<std::int64_t> particles;   // empty: the mode's own
+  std::vector<std::int64_t> particles;  // empty: the mode's own
   std::vector<int> threads;
   std::vector<std::string> scenes;
-  std::vector<InstructionSet> sets;      // empty: the preferred one
-  double seconds = 1.0;                  // of a block
-  std::int64_t steps = 0;                // of a block; 0: from `seconds`
-  int warm = 500;                        // steps before anything is timed
+  std::vector<InstructionSet> sets;  // empty: the preferred one
+  double seconds = 1.0;              // of a block
+  std::int64_t steps = 0;            // of a block; 0: from `seconds`
+  int warm = 500;                    // steps before anything is timed
   int rounds = 5;
-  int batch = 0;
+  int batch = 0, unroll = 0;     // 0 = chosen
+  double skin = 0.0, gap = 0.0;  // of lists, in radii; 0 = chosen
   std::string json;
   std::filesystem::path beds;
 };
+
+BenchEngine engine_of(const StepOptions& options, InstructionSet set, int threads);
 
 // Particles x scenes x instruction sets x threads, through Simulation::advance.
 void table_of_steps(const StepOptions& options);

@@ -26,6 +26,7 @@
 #include "protocol/output/output_error.h"
 #include "protocol/progress.h"
 #include "protocol/run_command.h"
+#include "protocol/study_command.h"
 #include "protocol/units.h"
 #include "protocol/usage_error.h"
 
@@ -149,6 +150,28 @@ Command add_law(CLI::App& program) {
           }};
 }
 
+Command add_study(CLI::App& program) {
+  CLI::App* app = program.add_subcommand("study", "run a scaling study: radii, scaling powers, seeds; resumable");
+  auto command = std::make_shared<StudyCommand>();
+  app->add_option("STUDY", command->study_file, "the study file (TOML)")->type_name("FILE")->required();
+  app->add_option("-o,--output", command->folder, "folder of the results; a study that is there already goes on")
+      ->type_name("DIR")
+      ->required();
+  app->add_option("--jobs", command->jobs, "runs at a time (default: the cores that this process may use)")
+      ->type_name("J")
+      ->check(CLI::Range(1, most_threads));
+  app->add_option("--set", command->overrides, "change one key of the study, as study.seeds='[1, 2, 3]'. May be repeated")
+      ->type_name("KEY=VALUE")
+      ->take_all()
+      ->allow_extra_args(false);
+  app->add_flag("--dry-run", command->dry_run, "print the runs and end");
+  app->add_flag("-q,--quiet", command->quiet, "print nothing but errors");
+  return {app, "platen study protocol/studies/fig4-7.toml -o studies/fig4-7", [=] {
+            check_instruction_set();
+            return study_command(*command);
+          }};
+}
+
 Command add_info(CLI::App& program) {
   CLI::App* app = program.add_subcommand("info", "say what is in a run folder, an HDF5 file or a case file");
   auto path = std::make_shared<std::filesystem::path>();
@@ -173,7 +196,8 @@ int run_program(int argc, char** argv) {
   program.set_help_flag("-h,--help", "print this help");
   program.require_subcommand(1);
   program.footer("platen COMMAND --help explains a command.");
-  const std::vector<Command> commands = {add_run(program), add_check(program), add_law(program), add_info(program)};
+  const std::vector<Command> commands = {add_run(program), add_check(program), add_law(program), add_study(program),
+                                         add_info(program)};
   for (const Command& command : commands) command.app->footer(std::string("Example:\n  ") + command.example);
 
   if (argc == 1) {

@@ -63,6 +63,8 @@ class RestWatch {
 };
 
 struct FillStage {
+  std::optional<double> landed_since_;  // [s]
+  static bool landed(const Stand& stand, const Measures& m);
   void begin(Stand& stand);
   void update(Stand&, const Look&) {}
   std::optional<std::string> done(Stand& stand, const Look& look);

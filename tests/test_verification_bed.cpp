@@ -42,7 +42,8 @@ void come_to_rest(Simulation& sim, double most) {
 
 // Drives the top plate down until it carries `stress` and stops there, again and again until the bed holds half of it.
 void press(Simulation& sim, double stress) {
-  for (int round = 0; round < 40 && sim.stress(plate_top) < 0.5 * stress; ++round) {
+  for (int round = 0; round == 0 || (round < 40 && sim.stress(plate_top) < 0.5 * stress); ++round) {
+    sim.advance(20);
     sim.set_plane_velocity(plate_top, -0.3);
     for (int k = 0; k < 2000 && sim.stress(plate_top) < stress; ++k) sim.advance(20);
     sim.set_plane_velocity(plate_top, 0.0);

@@ -79,17 +79,27 @@ void FillStage::begin(Stand& stand) {
 
 std::optional<std::string> FillStage::done(Stand& stand, const Look& look) {
   if (stand.spec.method == FillMethod::grow) return "bed grown to the target porosity";
-  // The last spheres have landed: what still moves is a thousandth of the energy of position, and the bottom carries all.
-  const Measures& m = look.m;
-  if (m.contacts == 0 && stand.sim.particles() > 1) return std::nullopt;
-  if (!(m.kinetic_energy <= 1e-3 * m.potential_energy && std::fabs(m.support_force - m.weight) <= 0.1 * m.weight)) return std::nullopt;
+  if (!landed(stand, look.m)) {
+    landed_since_.reset();
+    return std::nullopt;
+  }
+  // Throughout the time of a small bounce: a sphere at the top of one is slow, yet not landed.
+  if (!landed_since_) landed_since_ = look.m.time;
+  if (look.m.time - *landed_since_ < 0.05) return std::nullopt;
+  return "all spheres have landed";
+}
+
+// What still moves is a thousandth of the energy of position, and the bottom carries all.
+bool FillStage::landed(const Stand& stand, const Measures& m) {
+  if (m.contacts == 0 && stand.sim.particles() > 1) return false;
+  if (!(m.kinetic_energy <= 1e-3 * m.potential_energy && std::fabs(m.support_force - m.weight) <= 0.1 * m.weight)) return false;
   // In a large bed neither would notice a few late ones: none may be faster than from a fall by its own radius.
   const Particles& p = stand.sim.state();
   for (std::int32_t k = 0; k < p.count; ++k) {
     const auto a = static_cast<std::size_t>(k);
-    if (p.vx[a] * p.vx[a] + p.vy[a] * p.vy[a] + p.vz[a] * p.vz[a] > 2.0 * stand.c.gravity * p.radius_of(k)) return std::nullopt;
+    if (p.vx[a] * p.vx[a] + p.vy[a] * p.vy[a] + p.vz[a] * p.vz[a] > 2.0 * stand.c.gravity * p.radius_of(k)) return false;
   }
-  return "all spheres have landed";
+  return true;
 }
 
 void FillStage::end(Stand& stand, StageResult&) {
