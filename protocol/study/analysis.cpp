@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <set>
+#include <string_view>
 #include <tuple>
 
 #include "protocol/output/files.h"
@@ -40,6 +40,23 @@ MeasuredCurve measure(const StudyPlan& plan, const PlannedPart& part, const Plan
 
 bool chosen(const std::vector<std::string>& names, const std::string& name) {
   return names.empty() || std::find(names.begin(), names.end(), name) != names.end();
+}
+
+double range_of(const std::vector<Curve>& curves) {
+  const Band band = band_of(curves);
+  if (band.mean.empty()) return 0.0;
+  const auto [low, high] = std::minmax_element(band.mean.begin(), band.mean.end());
+  return *high - *low;
+}
+
+// Little happens on an unloading branch: its distances are seen against the range of loading too, else the smallest shift
+// would count for more than a wrong loading curve.
+double common_scale(const MeasuredCurve& reference, const std::string& observable) {
+  constexpr std::string_view ending = "_unloading";
+  double scale = range_of(reference.curves(observable));
+  if (observable.ends_with(ending))
+    scale = std::max(scale, range_of(reference.curves(observable.substr(0, observable.size() - ending.size()))));
+  return scale;
 }
 
 // Curves that differ in the scanned power alone, one scan for each radius, other power and set of varied keys.
@@ -151,8 +168,10 @@ std::vector<PartResults> analyse(const StudyPlan& plan, const fs::path& folder) 
       const std::size_t reference = part.curves[k].reference;
       if (reference == k) continue;
       for (const std::string& observable : part.study->observables)
-        if (const auto error = collapse_error(results.curves[reference].curves(observable), results.curves[k].curves(observable)))
-          results.collapse.push_back({k, reference, observable, *error});
+        if (auto error = collapse_error(results.curves[reference].curves(observable), results.curves[k].curves(observable))) {
+          if (const double scale = common_scale(results.curves[reference], observable); scale > 0.0) error->relative = error->error / scale;
+          results.collapse.push_back({k, reference, observable, std::move(*error)});
+        }
     }
     for (const ScanSpec& spec : part.study->scans)
       for (ScanResult& scan : Scanner(results, spec).run()) results.scans.push_back(std::move(scan));

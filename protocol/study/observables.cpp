@@ -189,7 +189,7 @@ void measure_compression(const SeriesTable& series, const Case& c, std::optional
   put(out, "strain_residual", strain_up.back());
   put(out, "porosity_residual", up.porosity.back());
   put(out, "coordination_unloaded", up.coordination.back());
-  put(out, "stress_bottom_unloaded", at_end(up, up.stress_bottom));
+  put(out, "stress_difference_unloaded", at_end(up, up.stress_bottom) - at_end(up, up.stress_top));
 }
 
 void measure_crush(const SeriesTable& series, const Case& c, RunMeasures& out) {
@@ -267,7 +267,7 @@ const std::vector<ScalarKind>& scalar_kinds() {
       {"strength_strain", "-", "strain at the strength"},
       {"initial_stiffness", "Pa", "largest tangent below half the strength"},
       {"stress_difference", "Pa", "bottom minus top stress at the end of the compression"},
-      {"stress_bottom_unloaded", "Pa", "bottom stress after unloading"},
+      {"stress_difference_unloaded", "Pa", "bottom minus top stress at the end of unloading"},
       {"weight_over_area", "Pa", "weight of the spheres over the plate's area"},
       {"strain_rate", "1/s", "plate speed over the smallest height of the compression"},
       {"inertial_peak", "-", "inertial number at the end of the compression"},

@@ -153,11 +153,11 @@ void judge_cross_checks(Judge& judge) {
     if (curve.runs.empty()) continue;
     const std::string& label = curve.planned->label;
     const double weight = Judge::mean(&curve, "weight_over_area");
-    const double difference = Judge::mean(&curve, "stress_difference"), unloaded = Judge::mean(&curve, "stress_bottom_unloaded");
+    const double difference = Judge::mean(&curve, "stress_difference"), unloaded = Judge::mean(&curve, "stress_difference_unloaded");
     if (std::isfinite(difference))
       judge.number("checks", label + ": bottom minus top stress over weight/area, end of loading", difference / weight, {0.98, 1.02}, 4);
     if (std::isfinite(unloaded))
-      judge.number("checks", label + ": bottom stress over weight/area after unloading", unloaded / weight, {0.98, 1.02}, 4);
+      judge.number("checks", label + ": bottom minus top stress over weight/area, end of unloading", unloaded / weight, {0.98, 1.02}, 4);
     const double overlap = Judge::mean(&curve, "largest_overlap");
     if (std::isfinite(overlap)) judge.number("checks", label + ": largest overlap over the diameter", overlap, {.high = 0.25}, 1, "%", 100.0);
   }
