@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "protocol/case_alternatives.h"
+
 namespace platen {
 namespace {
 
@@ -57,10 +59,11 @@ bool read_sizes(TableReader& sizes, SizeDistribution& out) {
   return good;
 }
 
-void read_law(TableReader& law, PairLaw& out) {
+void read_law(TableReader& law, const ParticleSpec& particles, PairLaw& out) {
   // With another exponent the stiffnesses are N/m^n, for which there are no unit names. A bad exponent stays 1 here.
   law.number("exponent", positive, Need::optional, out.exponent);
   const auto stiffness = [&](const char* key, Range range, Need need, double& value) {
+    if (is_table(law, key)) return read_stiffness_alternative(law, key, particles, out.exponent, value);
     if (out.exponent == 1.0) return law.quantity(key, Quantity::stiffness, range, need, value);
     return law.number(key, range, need, value,
                       "with an exponent other than 1 stiffnesses are in N/m^n and take no unit");
@@ -71,7 +74,8 @@ void read_law(TableReader& law, PairLaw& out) {
   if (k1 && k2 && out.k2 < out.k1) {
     law.error("k2", fmt::format("{:g} is smaller than k1 = {:g}; allowed: k2 >= k1", out.k2, out.k1));
   }
-  law.quantity("f0", Quantity::force, not_positive, Need::optional, out.f0);
+  if (is_table(law, "f0")) read_f0_alternative(law, "f0", particles, out.f0);
+  else law.quantity("f0", Quantity::force, not_positive, Need::optional, out.f0);
   law.number("tangential_ratio", not_negative, Need::optional, out.tangential_ratio);
   law.number("restitution", proper_part, Need::optional, out.restitution);
   out.friction = 0.5;
@@ -124,7 +128,7 @@ void read_particles(TableReader& particles, ParticleSpec& out, CaseFacts& facts)
   particles.quantity("density", Quantity::density, positive, need, out.density);
   particles.integer("count", 1, 1'000'000'000, need, out.count);
   TableReader law = particles.table("law", Need::required);
-  read_law(law, out.law);
+  read_law(law, out, out.law);
   particles.refuse_unknown("particles");
 }
 

@@ -70,8 +70,10 @@ PairLaw scaled_law(const PairLaw& reference, const ScalingPowers& powers, double
     const double kept = 3.0 + powers.stiffness + reference.exponent - 1.0;
     const double z = damping_of(reference.restitution) * std::pow(lambda, 2.0 * *powers.dashpots - kept);
     if (!(z < 1.0))
-      throw std::domain_error(fmt::format("dashpots ~ R^{:g} at {:g} times the reference radius need more than critical "
-                                          "damping (z = {:g}); allowed: z < 1", *powers.dashpots, lambda, z));
+      throw std::domain_error(
+          fmt::format("dashpots ~ R^{:g} at {:g} times the reference radius need more than critical "
+                      "damping (z = {:g}); allowed: z < 1",
+                      *powers.dashpots, lambda, z));
     law.restitution = restitution_of(z);
   }
   return law;
@@ -86,15 +88,17 @@ std::vector<std::string> scaling_overrides(const Case& base, const ScalingPowers
   std::vector<std::string> out;
   if (lambda == 1.0) return out;
   if (!base.particles.file.empty())
-    throw std::domain_error("spheres from a file cannot be scaled; allowed: a base case with radius or sizes, and fill");
+    throw std::domain_error(
+        "spheres from a file cannot be scaled; allowed: a base case with radius or sizes, and fill");
   const PairLaw& before = base.particles.law;
   const PairLaw after = scaled_law(before, powers, lambda);
   scale_sizes(base.particles.sizes, lambda, out);
   out.push_back("particles.count=" + std::to_string(scaled_count(base.particles.count, lambda)));
-  if (after.k1 != before.k1) set(out, "particles.law.k1", after.k1);
-  if (after.k2 != before.k2) set(out, "particles.law.k2", after.k2);
-  if (after.k_adh != before.k_adh) set(out, "particles.law.k_adh", after.k_adh);
-  if (after.f0 != before.f0) set(out, "particles.law.f0", after.f0);
+  // Unchanged ones too: the case may give them by material data, which would be worked out for the new radius.
+  set(out, "particles.law.k1", after.k1);
+  set(out, "particles.law.k2", after.k2);
+  set(out, "particles.law.k_adh", after.k_adh);
+  set(out, "particles.law.f0", after.f0);
   if (after.restitution != before.restitution) set(out, "particles.law.restitution", after.restitution);
   if (base.time.step && powers.time_step != 0.0)
     set(out, "time.step", *base.time.step * std::pow(lambda, powers.time_step));
@@ -117,9 +121,12 @@ double stiffness_of_modulus(double radius, double young_modulus) { return 0.5 * 
 double f0_of_surface_energy(double radius, double surface_energy, AdhesionModel model, double flattening) {
   const double R = 0.5 * radius;
   switch (model) {
-    case AdhesionModel::dmt: return -4.0 * pi * surface_energy * R;
-    case AdhesionModel::jkr: return -3.0 * pi * surface_energy * R;
-    case AdhesionModel::plastic_jkr: return -3.0 * pi * surface_energy * R * flattening;
+    case AdhesionModel::dmt:
+      return -4.0 * pi * surface_energy * R;
+    case AdhesionModel::jkr:
+      return -3.0 * pi * surface_energy * R;
+    case AdhesionModel::plastic_jkr:
+      return -3.0 * pi * surface_energy * R * flattening;
   }
   return std::numeric_limits<double>::quiet_NaN();
 }
@@ -128,7 +135,8 @@ double f0_of_hamaker(double radius, double hamaker_constant, double distance) {
   return -hamaker_constant * 0.5 * radius / (6.0 * distance * distance);
 }
 
-double f0_of_tensile_strength(double radius, double tensile_strength, double solid_fraction, double coordination_number) {
+double f0_of_tensile_strength(double radius, double tensile_strength, double solid_fraction,
+                              double coordination_number) {
   return -4.0 * pi * radius * radius * tensile_strength / (solid_fraction * coordination_number);
 }
 

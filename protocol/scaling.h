@@ -22,10 +22,10 @@
 namespace platen {
 
 struct ScalingPowers {
-  double stiffness = 1.0;           // a
-  double adhesion = 2.0;            // b
-  std::optional<double> dashpots;   // c; empty: restitution is kept
-  double time_step = 0.0;           // a fixed time.step ~ lambda^this; no effect on "auto"
+  double stiffness = 1.0;            // a
+  double adhesion = 2.0;             // b
+  std::optional<double> dashpots{};  // c; empty: restitution is kept
+  double time_step = 0.0;            // a fixed time.step ~ lambda^this; no effect on "auto"
 };
 
 // The law of spheres that are `lambda` times as large as the reference's. Throws std::domain_error where the wanted
@@ -69,7 +69,8 @@ double f0_of_hamaker(double radius, double hamaker_constant, double distance);
 
 // From a tensile strength sigma_t [Pa] by Rumpf, sigma_t = phi CN |f0| / (4 pi R^2) [Thakur2016, Eq. 20, 21], with phi the
 // solid fraction and CN the coordination number: f0 ~ R^2 at equal strength. [N]
-double f0_of_tensile_strength(double radius, double tensile_strength, double solid_fraction, double coordination_number);
+double f0_of_tensile_strength(double radius, double tensile_strength, double solid_fraction,
+                              double coordination_number);
 
 // |f0| over the weight of a sphere, f_g = 4/3 pi R^3 rho g [Thakur2016, Eq. 22]: constant for f0 ~ R^3. [-]
 double bond_number(double f0, double radius, double density, double gravity);

@@ -46,7 +46,8 @@ UniqueFd lock(const fs::path& folder) {
   const fs::path file = folder / ".lock";
   UniqueFd fd(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
   if (fd.get() < 0) throw system_error(file, "cannot open", errno);
-  if (::flock(fd.get(), LOCK_EX | LOCK_NB) != 0) throw OutputError(folder.string() + ": another process works in this folder");
+  if (::flock(fd.get(), LOCK_EX | LOCK_NB) != 0)
+    throw OutputError(folder.string() + ": another process works in this folder");
   return fd;
 }
 
@@ -68,7 +69,8 @@ class StudyPrinter {
     if (style_ == ProgressPrinter::Style::quiet || p.wall_seconds < next_) return;
     const bool in_place = style_ == ProgressPrinter::Style::in_place;
     next_ = p.wall_seconds + (in_place ? 0.2 : 10.0);
-    std::string line = fmt::format("{} of {} runs done, {} running, {:.0f} %", p.finished, p.jobs, p.running, 100.0 * p.fraction);
+    std::string line =
+        fmt::format("{} of {} runs done, {} running, {:.0f} %", p.finished, p.jobs, p.running, 100.0 * p.fraction);
     if (p.failed > 0) line += fmt::format(", {} failed", p.failed);
     if (p.seconds_left) line += fmt::format(", {} left", duration_text(*p.seconds_left));
     if (p.running > 0) line += ", " + p.newest;
@@ -89,7 +91,8 @@ class StudyPrinter {
 
 int exit_code_of(const std::vector<JobOutcome>& outcomes) {
   for (const JobOutcome& outcome : outcomes)
-    if (outcome.state == JobState::failed) return outcome.exit_code > 127 ? exit_goal : outcome.exit_code == 0 ? exit_io : outcome.exit_code;
+    if (outcome.state == JobState::failed)
+      return outcome.exit_code > 127 ? exit_goal : outcome.exit_code == 0 ? exit_io : outcome.exit_code;
   return exit_done;
 }
 
@@ -122,15 +125,17 @@ int study_command(const StudyCommand& command) {
                    outcome.steal_seconds ? fmt::format(", steal time {:.1f} s", *outcome.steal_seconds) : "");
   };
   if (!command.quiet)
-    spdlog::info("{}: {} runs, {} at a time, into {}", command.study_file.filename().string(), plan.jobs.size(), options.jobs,
-                 command.folder.string());
+    spdlog::info("{}: {} runs, {} at a time, into {}", command.study_file.filename().string(), plan.jobs.size(),
+                 options.jobs, command.folder.string());
   const std::vector<JobOutcome> outcomes = run_jobs(plan, options);
   printer.clear();
 
   write_run_table(command.folder, plan, outcomes);
-  const auto stopped = std::count_if(outcomes.begin(), outcomes.end(), [](const JobOutcome& o) { return o.state == JobState::stopped; });
+  const auto stopped =
+      std::count_if(outcomes.begin(), outcomes.end(), [](const JobOutcome& o) { return o.state == JobState::stopped; });
   if (stopped > 0) {
-    if (!command.quiet) spdlog::warn("stopped by request, {} of {} runs are left; the same command goes on", stopped, plan.jobs.size());
+    if (!command.quiet)
+      spdlog::warn("stopped by request, {} of {} runs are left; the same command goes on", stopped, plan.jobs.size());
     return exit_stopped;
   }
   const std::vector<PartResults> results = analyse(plan, command.folder);
@@ -146,12 +151,16 @@ int study_command(const StudyCommand& command) {
       return std::count_if(statements.begin(), statements.end(), [&](const Statement& s) { return s.holds == holds; });
     };
     if (!statements.empty())
-      print(fmt::format("statements: {} hold, {} do not hold, {} not judged (statements.md)\n", count(true), count(false), count(std::nullopt)));
-    print(fmt::format("results: {} (study.h5, statements.md, runs.csv, tables/, figures/, runs/)\n", command.folder.string()));
+      print(fmt::format("statements: {} hold, {} do not hold, {} not judged (statements.md)\n", count(true),
+                        count(false), count(std::nullopt)));
+    print(fmt::format("results: {} (study.h5, statements.md, runs.csv, tables/, figures/, runs/)\n",
+                      command.folder.string()));
   }
   const int code = exit_code_of(outcomes);
   if (code != exit_done)
-    spdlog::error("{} of {} runs failed: {}", std::count_if(outcomes.begin(), outcomes.end(), [](const JobOutcome& o) { return o.state == JobState::failed; }),
+    spdlog::error("{} of {} runs failed: {}",
+                  std::count_if(outcomes.begin(), outcomes.end(),
+                                [](const JobOutcome& o) { return o.state == JobState::failed; }),
                   plan.jobs.size(), (command.folder / "runs.csv").string());
   return code;
 }

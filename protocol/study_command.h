@@ -10,10 +10,10 @@ namespace platen {
 
 struct StudyCommand {
   std::filesystem::path study_file;
-  std::filesystem::path folder;          // of the results; taken up again where it holds the same study
-  std::vector<std::string> overrides;    // --set, of the study: study.seeds=[1,2,3]
-  std::optional<int> jobs;               // runs at a time; default: usable_cores()
-  bool dry_run = false;                  // print the runs and end
+  std::filesystem::path folder;        // of the results; taken up again where it holds the same study
+  std::vector<std::string> overrides;  // --set, of the study: study.seeds=[1,2,3]
+  std::optional<int> jobs;             // runs at a time; default: usable_cores()
+  bool dry_run = false;                // print the runs and end
   bool quiet = false;
 };
 

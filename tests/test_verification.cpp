@@ -201,7 +201,7 @@ TEST(Verification, StackComesToRest) {
 TEST(Verification, CohesivePairDoesNotHeat) {
   heading("A pair held by f0 alone");
   const double R = 2.5e-3, m_eff = 0.5 * mass_of(R), dt = 1e-5;
-  Figure hovering("largest kinetic energy / (m* (f0 dt/m*)^2 + energy at the start)", ""), resting("kinetic energy at the end / (f0^2/2 k1)", ""),
+  Figure hovering("largest kinetic energy / (f0^2/(2 k1) + that of one kick)", ""), resting("kinetic energy at the end / (f0^2/(2 k1))", ""),
       equilibrium("force at the end / f0", "");
   for (const double f0 : {-0.02, -0.4, -1.6})
     for (const double e : {0.1, 0.4, 0.9}) {
@@ -233,7 +233,7 @@ TEST(Verification, CohesivePairDoesNotHeat) {
 TEST(Verification, UndampedChatterStaysBounded) {
   heading("An undamped pair held by f0 that touches and parts again in a periodic box");
   const double R = 2.5e-3, m_eff = 0.5 * mass_of(R), f0 = -0.4;
-  Figure gain("energy above that at the start / |f0| v dt", "");
+  Figure gain("energy above that at the start / (f0 v dt, per root of touches)", "");
   for (const double dt : {1e-5, 2.5e-6})
     for (const double v : {0.02, 0.2, 1.0}) {
       PairLaw law;

@@ -139,7 +139,7 @@ TEST(VerificationBed, StressOfKnownContacts) {
 
 TEST(VerificationBed, Momentum) {
   heading("Momentum of 125 spheres that collide, without plates and gravity, after 2000 steps");
-  Figure linear("largest component of the change of momentum / sum of m |v|", ""), angular("the same of angular momentum / sum of m |x v| ", "");
+  Figure linear("largest component of the change of momentum / sum of all sizes", ""), angular("change of angular momentum / sum of all sizes", "");
   for (const scenes::LawCase& row : scenes::laws_of_scenes()) {
     PairLaw law = row.law;
     law.rolling_friction = 0.0;  // the absolute model gives no pair of torques

@@ -21,7 +21,8 @@ nlohmann::json json_of(const fs::path& file) {
   return json.is_object() ? json : nlohmann::json::object();
 }
 
-MeasuredCurve measure(const StudyPlan& plan, const PlannedPart& part, const PlannedCurve& planned, const fs::path& folder) {
+MeasuredCurve measure(const StudyPlan& plan, const PlannedPart& part, const PlannedCurve& planned,
+                      const fs::path& folder) {
   MeasuredCurve out;
   out.planned = &planned;
   for (std::size_t k = 0; k < planned.jobs.size(); ++k) {
@@ -69,7 +70,9 @@ class Scanner {
     std::map<Group, std::map<double, std::size_t>> groups;  // power -> curve
     for (std::size_t k = 0; k < part_.curves.size(); ++k) {
       const PlannedCurve& curve = *part_.curves[k].planned;
-      if (!chosen(spec_.curves, curve.block) || curve.radius == part_.plan->reference_radius || part_.curves[k].runs.empty()) continue;
+      if (!chosen(spec_.curves, curve.block) || curve.radius == part_.plan->reference_radius ||
+          part_.curves[k].runs.empty())
+        continue;
       groups[{curve.radius, other(curve), curve.varied, curve.reference}].emplace(power(curve), k);
     }
     std::vector<ScanResult> out;
@@ -168,8 +171,10 @@ std::vector<PartResults> analyse(const StudyPlan& plan, const fs::path& folder) 
       const std::size_t reference = part.curves[k].reference;
       if (reference == k) continue;
       for (const std::string& observable : part.study->observables)
-        if (auto error = collapse_error(results.curves[reference].curves(observable), results.curves[k].curves(observable))) {
-          if (const double scale = common_scale(results.curves[reference], observable); scale > 0.0) error->relative = error->error / scale;
+        if (auto error =
+                collapse_error(results.curves[reference].curves(observable), results.curves[k].curves(observable))) {
+          if (const double scale = common_scale(results.curves[reference], observable); scale > 0.0)
+            error->relative = error->error / scale;
           results.collapse.push_back({k, reference, observable, std::move(*error)});
         }
     }

@@ -17,14 +17,14 @@ namespace platen {
 // A planned curve with what its runs measured; a failed run is missing from `runs`.
 struct MeasuredCurve {
   const PlannedCurve* planned = nullptr;
-  std::vector<std::uint64_t> seeds;     // of each run here
-  std::vector<std::size_t> jobs;        // of each run here
+  std::vector<std::uint64_t> seeds;  // of each run here
+  std::vector<std::size_t> jobs;     // of each run here
   std::vector<RunMeasures> runs;
-  std::vector<double> wall_seconds;     // of each run, as its summary says; NaN where it does not
-  std::vector<double> steal_seconds;    // of timed runs; 0 otherwise
+  std::vector<double> wall_seconds;   // of each run, as its summary says; NaN where it does not
+  std::vector<double> steal_seconds;  // of timed runs; 0 otherwise
 
-  std::vector<Curve> curves(const std::string& observable) const;     // of the runs that have it
-  std::vector<double> values(const std::string& scalar) const;        // of the runs that have it
+  std::vector<Curve> curves(const std::string& observable) const;  // of the runs that have it
+  std::vector<double> values(const std::string& scalar) const;     // of the runs that have it
 };
 
 struct CollapseRow {
@@ -35,20 +35,20 @@ struct CollapseRow {
 
 struct ScanResult {
   ScanSpec::Power power = ScanSpec::Power::stiffness;
-  std::string observable;                     // "all": root of the mean of the squared relative errors of all observables
-  double radius = 0.0;                        // [m]
-  double other_power = 0.0;                   // the one that is not scanned
-  std::vector<double> powers;                 // increasing
-  std::vector<double> errors;                 // mean over seeds, relative to the reference's range
-  std::vector<std::vector<double>> each;      // [seed][power], relative
+  std::string observable;                 // "all": root of the mean of the squared relative errors of all observables
+  double radius = 0.0;                    // [m]
+  double other_power = 0.0;               // the one that is not scanned
+  std::vector<double> powers;             // increasing
+  std::vector<double> errors;             // mean over seeds, relative to the reference's range
+  std::vector<std::vector<double>> each;  // [seed][power], relative
   std::optional<Minimum> minimum;
-  double best_tried = 0.0;                    // the tried power of least error
+  double best_tried = 0.0;  // the tried power of least error
 };
 
 struct PartResults {
   const PlannedPart* plan = nullptr;
-  std::vector<MeasuredCurve> curves;          // as plan->curves
-  std::vector<CollapseRow> collapse;          // every curve that is not its own reference, every observable
+  std::vector<MeasuredCurve> curves;  // as plan->curves
+  std::vector<CollapseRow> collapse;  // every curve that is not its own reference, every observable
   std::vector<ScanResult> scans;
 };
 

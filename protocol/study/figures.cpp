@@ -34,7 +34,9 @@ Axis axis(const std::string& label, const std::string& unit) {
 }
 
 // Stress over strain and height over porosity, as people draw them; measured the other way round.
-bool swapped(const std::string& observable) { return observable.starts_with("stress_strain") || observable == "porosity_height"; }
+bool swapped(const std::string& observable) {
+  return observable.starts_with("stress_strain") || observable == "porosity_height";
+}
 
 // A text inside gnuplot's double quotes; labels are plain text, not markup.
 std::string gnuplot_text(const std::string& text) {
@@ -50,18 +52,23 @@ std::string script_head(const std::string& name, const std::string& title, const
   return fmt::format(
       "# gnuplot {0}.gp draws {0}.svg and {0}.png from {0}.dat\n"
       "set terminal svg size 800,560 noenhanced font \"sans,14\" background \"white\"\nset output \"{0}.svg\"\n"
-      "set title {1}\nset xlabel {2}\nset ylabel {3}\nset key outside right top\nset grid\n",
+      "set title {1}\nset xlabel {2}\nset ylabel {3}\nset key outside right top\nset grid\n"
+      "set linetype 1 lc rgb \"#000000\"\nset linetype 2 lc rgb \"#0072b2\"\nset linetype 3 lc rgb \"#d55e00\"\n"
+      "set linetype 4 lc rgb \"#009e73\"\nset linetype 5 lc rgb \"#cc79a7\"\nset linetype 6 lc rgb \"#e69f00\"\n"
+      "set linetype 7 lc rgb \"#56b4e9\"\nset linetype 8 lc rgb \"#7f3c8d\"\nset linetype cycle 8\n",
       name, gnuplot_text(title), gnuplot_text(x), gnuplot_text(y));
 }
 
 std::string script_tail(const std::string& name) {
-  return fmt::format("\nset terminal pngcairo size 1200,840 noenhanced font \"sans,14\"\nset output \"{}.png\"\nreplot\n", name);
+  return fmt::format(
+      "\nset terminal pngcairo size 1200,840 noenhanced font \"sans,14\"\nset output \"{}.png\"\nreplot\n", name);
 }
 
 // Runs gnuplot in the folder; an empty text, or what went wrong.
 std::string run_gnuplot(const fs::path& folder, const std::string& name) {
   // posix_spawn cannot change the folder portably; gnuplot can.
-  std::vector<std::string> words{"gnuplot", "-e", "cd " + gnuplot_text(folder.string()), (folder / (name + ".gp")).string()};
+  std::vector<std::string> words{"gnuplot", "-e", "cd " + gnuplot_text(folder.string()),
+                                 (folder / (name + ".gp")).string()};
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
@@ -74,20 +81,23 @@ std::string run_gnuplot(const fs::path& folder, const std::string& name) {
   pid_t child = 0;
   const int error = posix_spawnp(&child, "gnuplot", &actions, nullptr, argv.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
-  if (error != 0) return fmt::format("{}: gnuplot cannot be started ({}); data and script are there", name, std::strerror(error));
+  if (error != 0)
+    return fmt::format("{}: gnuplot cannot be started ({}); data and script are there", name, std::strerror(error));
   int status = 0;
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {}
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
     std::string text = read_whole_file(log);
     std::replace(text.begin(), text.end(), '\n', ' ');
-    return WIFEXITED(status) && WEXITSTATUS(status) == 127 ? name + ": gnuplot is not installed; data and script are there"
-                                                            : fmt::format("{}: gnuplot failed: {}", name, text);
+    return WIFEXITED(status) && WEXITSTATUS(status) == 127
+               ? name + ": gnuplot is not installed; data and script are there"
+               : fmt::format("{}: gnuplot failed: {}", name, text);
   }
   fs::remove(log);
   return {};
 }
 
-std::string write_and_draw(const fs::path& folder, const std::string& name, const std::string& data, const std::string& script) {
+std::string write_and_draw(const fs::path& folder, const std::string& name, const std::string& data,
+                           const std::string& script) {
   write_whole_file(folder / (name + ".dat"), data);
   write_whole_file(folder / (name + ".gp"), script);
   return run_gnuplot(folder, name);
@@ -110,7 +120,9 @@ std::string draw_curves(const fs::path& folder, const PartResults& part, const F
   };
   for (const MeasuredCurve& curve : part.curves) {
     const PlannedCurve& planned = *curve.planned;
-    if (!figure.curves.empty() && std::find(figure.curves.begin(), figure.curves.end(), planned.block) == figure.curves.end()) continue;
+    if (!figure.curves.empty() &&
+        std::find(figure.curves.begin(), figure.curves.end(), planned.block) == figure.curves.end())
+      continue;
     bool any = false;
     for (const std::string& observable : figure.observables) {
       const std::vector<Curve> seeds = curve.curves(observable);
@@ -120,7 +132,8 @@ std::string draw_curves(const fs::path& folder, const PartResults& part, const F
       if (seeds.size() > 1)
         for (std::size_t k = 0; k < seeds.size(); ++k) {
           const Band one = band_of({seeds[k]});
-          add({one.x, one.mean}, fmt::format("{}, {}, one seed", planned.label, observable), fmt::format("with lines lt {} lw 0.5 notitle", colour));
+          add({one.x, one.mean}, fmt::format("{}, {}, one seed", planned.label, observable),
+              fmt::format("with lines lt {} lw 0.5 notitle", colour));
         }
       add({band.x, band.mean}, fmt::format("{}, {}, mean", planned.label, observable),
           fmt::format("with lines lt {} lw 2 {}", colour, any ? "notitle" : "title " + gnuplot_text(planned.label)));
@@ -129,8 +142,8 @@ std::string draw_curves(const fs::path& folder, const PartResults& part, const F
   }
   if (plots.empty()) return figure.name + ": nothing to draw, no run is done";
   return write_and_draw(folder, figure.name, data,
-                        script_head(figure.name, figure.title, turn ? y.label : x.label, turn ? x.label : y.label) + "plot \\\n" + plots +
-                            script_tail(figure.name));
+                        script_head(figure.name, figure.title, turn ? y.label : x.label, turn ? x.label : y.label) +
+                            "plot \\\n" + plots + script_tail(figure.name));
 }
 
 std::string draw_scans(const fs::path& folder, const PartResults& part, ScanSpec::Power power) {
@@ -139,17 +152,20 @@ std::string draw_scans(const fs::path& folder, const PartResults& part, ScanSpec
   int index = 0;
   for (const ScanResult& scan : part.scans) {
     if (scan.power != power) continue;
-    data += fmt::format("# R = {:g} mm, {}: power, error over the reference's range\n", 1e3 * scan.radius, scan.observable);
-    for (std::size_t k = 0; k < scan.powers.size(); ++k) data += fmt::format("{:.9g} {:.9g}\n", scan.powers[k], scan.errors[k]);
+    data +=
+        fmt::format("# R = {:g} mm, {}: power, error over the reference's range\n", 1e3 * scan.radius, scan.observable);
+    for (std::size_t k = 0; k < scan.powers.size(); ++k)
+      data += fmt::format("{:.9g} {:.9g}\n", scan.powers[k], scan.errors[k]);
     data += "\n\n";
     std::string title = fmt::format("{:g} mm, {}", 1e3 * scan.radius, scan.observable);
     if (scan.minimum && scan.minimum->inside) title += fmt::format(": {:.2f}", scan.minimum->power);
-    plots += fmt::format("{}  \"{}.dat\" index {} with linespoints lw {} title {}", plots.empty() ? "" : ", \\\n", name, index++,
-                         scan.observable == "all" ? 3 : 1, gnuplot_text(title));
+    plots += fmt::format("{}  \"{}.dat\" index {} with linespoints lw {} title {}", plots.empty() ? "" : ", \\\n", name,
+                         index++, scan.observable == "all" ? 3 : 1, gnuplot_text(title));
   }
   if (plots.empty()) return {};
   return write_and_draw(folder, name, data,
-                        script_head(name, "collapse error over the " + word + " power", word + " power", "collapse error / range of the reference") +
+                        script_head(name, "collapse error over the " + word + " power", word + " power",
+                                    "collapse error / range of the reference") +
                             "set yrange [0:*]\nplot \\\n" + plots + script_tail(name));
 }
 
@@ -162,11 +178,13 @@ std::string draw_timing(const fs::path& folder, const PartResults& part) {
   int index = 0;
   for (const auto& [power, points] : by_step) {
     data += fmt::format("# time step ~ R^{:g}: radius [mm], wall time [s]\n", power) + points + "\n\n";
-    plots += fmt::format("{}  \"run-time.dat\" index {} with points pt 7 title \"time step ~ R^{:g}\"", plots.empty() ? "" : ", \\\n", index++, power);
+    plots += fmt::format("{}  \"run-time.dat\" index {} with points pt 7 title \"time step ~ R^{:g}\"",
+                         plots.empty() ? "" : ", \\\n", index++, power);
   }
   if (plots.empty()) return {};
   return write_and_draw(folder, "run-time", data,
-                        script_head("run-time", "run time", "sphere radius [mm]", "wall time [s]") + "set yrange [0:*]\nplot \\\n" + plots + script_tail("run-time"));
+                        script_head("run-time", "run time", "sphere radius [mm]", "wall time [s]") +
+                            "set yrange [0:*]\nplot \\\n" + plots + script_tail("run-time"));
 }
 
 }  // namespace

@@ -11,6 +11,7 @@ namespace platen {
 
 // Writes data and scripts of every figure of a part, its scans and its run times, and draws them. Returns what could not
 // be drawn and why, one line each (gnuplot missing or failed); the data are there all the same. Throws OutputError.
-std::vector<std::string> draw_figures(const std::filesystem::path& folder, const StudyPlan& plan, const PartResults& part);
+std::vector<std::string> draw_figures(const std::filesystem::path& folder, const StudyPlan& plan,
+                                      const PartResults& part);
 
 }  // namespace platen

@@ -33,7 +33,8 @@ const MeasuredCurve* Judge::reference() const {
 const MeasuredCurve* Judge::scaled(double radius, std::optional<double> a, std::optional<double> b) const {
   for (const MeasuredCurve* curve : plain()) {
     const ScalingPowers& powers = curve->planned->powers;
-    if (curve->planned->radius == radius && (!a || powers.stiffness == *a) && (!b || powers.adhesion == *b)) return curve;
+    if (curve->planned->radius == radius && (!a || powers.stiffness == *a) && (!b || powers.adhesion == *b))
+      return curve;
   }
   return nullptr;
 }
@@ -69,13 +70,16 @@ void Judge::number(const std::string& figure, const std::string& text, double va
   std::string allowed;
   if (std::isfinite(bounds.low) && std::isfinite(bounds.high))
     allowed = fmt::format("{:g} to {:g}{}", scale * bounds.low, scale * bounds.high, with_unit);
-  else if (std::isfinite(bounds.high)) allowed = fmt::format("at most {:g}{}", scale * bounds.high, with_unit);
-  else allowed = fmt::format("at least {:g}{}", scale * bounds.low, with_unit);
+  else if (std::isfinite(bounds.high))
+    allowed = fmt::format("at most {:g}{}", scale * bounds.high, with_unit);
+  else
+    allowed = fmt::format("at least {:g}{}", scale * bounds.low, with_unit);
   say(figure, text + ": " + allowed, fmt::format("{:.{}f}{}", scale * value, decimals, with_unit),
       value >= bounds.low && value <= bounds.high);
 }
 
-void Judge::say(const std::string& figure, const std::string& text, const std::string& number, std::optional<bool> holds) {
+void Judge::say(const std::string& figure, const std::string& text, const std::string& number,
+                std::optional<bool> holds) {
   out_->push_back({part_.plan->study->name, figure, text, number, holds});
 }
 

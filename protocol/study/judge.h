@@ -26,9 +26,9 @@ class Judge {
   // Unvaried curves; nullptr where there is none or none of its runs is done.
   const MeasuredCurve* reference() const;
   const MeasuredCurve* scaled(double radius, std::optional<double> a, std::optional<double> b) const;
-  std::vector<double> radii() const;                 // of unvaried curves, without the reference's, increasing
-  std::vector<const MeasuredCurve*> plain() const;   // all unvaried curves with runs
-  bool is_plain(const MeasuredCurve& curve) const;   // nothing but radius and powers differs from the base
+  std::vector<double> radii() const;                // of unvaried curves, without the reference's, increasing
+  std::vector<const MeasuredCurve*> plain() const;  // all unvaried curves with runs
+  bool is_plain(const MeasuredCurve& curve) const;  // nothing but radius and powers differs from the base
 
   // Mean over seeds of a scalar; NaN for nullptr and where no run has it.
   static double mean(const MeasuredCurve* curve, const std::string& scalar);

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <stdexcept>
 
 #include "protocol/output/hdf5_file.h"
@@ -150,7 +150,8 @@ std::vector<double> strain_of(const StageRows& rows, double h0) {
   return strain;
 }
 
-void measure_compression(const SeriesTable& series, const Case& c, std::optional<double> wanted_zero, RunMeasures& out) {
+void measure_compression(const SeriesTable& series, const Case& c, std::optional<double> wanted_zero,
+                         RunMeasures& out) {
   const std::string name = first_stage(c, StageKind::compress);
   const StageRows rows = rows_of(series, name);
   if (rows.empty()) return;
@@ -232,7 +233,8 @@ const std::vector<ObservableKind>& observable_kinds() {
       {"stress_strain_unloading", "axial stress", "Pa", "axial strain", "-", "strain over stress while unloading"},
       {"porosity", "axial stress", "Pa", "porosity", "-", "porosity over stress while loading"},
       {"porosity_unloading", "axial stress", "Pa", "porosity", "-", "porosity over stress while unloading"},
-      {"coordination", "axial stress", "Pa", "coordination number", "-", "coordination number over stress while loading"},
+      {"coordination", "axial stress", "Pa", "coordination number", "-",
+       "coordination number over stress while loading"},
       {"coordination_unloading", "axial stress", "Pa", "coordination number", "-",
        "coordination number over stress while unloading"},
       {"porosity_height", "height / bed height", "-", "porosity of the slab", "-",
@@ -272,7 +274,8 @@ const std::vector<ScalarKind>& scalar_kinds() {
       {"strain_rate", "1/s", "plate speed over the smallest height of the compression"},
       {"inertial_peak", "-", "inertial number at the end of the compression"},
       {"quasi_static_stress", "Pa", "stress from which on the inertial number stays below 1e-4"},
-      {"largest_overlap", "-", "largest overlap of the contacts left at the end, over the diameter, from their history"},
+      {"largest_overlap", "-",
+       "largest overlap of the contacts left at the end, over the diameter, from their history"},
   };
   return kinds;
 }
@@ -286,8 +289,9 @@ RunMeasures measure_run(const std::filesystem::path& folder, const Case& c, std:
   measure_crush(series, c, out);
   if (c.particles.sizes.kind == SizeDistribution::Kind::mono && c.box.given) {
     const double R = c.particles.sizes.radius;
-    put(out, "weight_over_area", static_cast<double>(c.particles.count) * 4.0 / 3.0 * std::numbers::pi * R * R * R * c.particles.density *
-                                     c.gravity / (c.box.width * c.box.depth));
+    put(out, "weight_over_area",
+        static_cast<double>(c.particles.count) * 4.0 / 3.0 * std::numbers::pi * R * R * R * c.particles.density *
+            c.gravity / (c.box.width * c.box.depth));
   }
   const auto results = Hdf5File::open(folder / "results.h5");
   out.curves["porosity_height"] = height_profile(results.root(), first_stage(c, StageKind::compress));

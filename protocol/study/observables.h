@@ -43,8 +43,8 @@ struct ScalarKind {
 const std::vector<ScalarKind>& scalar_kinds();
 
 struct RunMeasures {
-  std::map<std::string, Curve> curves;     // by name of the observable; absent where the run has no such stage
-  std::map<std::string, double> scalars;   // by name of the scalar; absent likewise
+  std::map<std::string, Curve> curves;    // by name of the observable; absent where the run has no such stage
+  std::map<std::string, double> scalars;  // by name of the scalar; absent likewise
 };
 
 // Measures a finished run. `strain_zero` is the stress at which strain starts to count [Pa]; empty: that of the case's

@@ -19,7 +19,8 @@ namespace {
 std::string path_part(const std::string& text) {
   std::string out;
   for (const char c : text) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '-' || c == '+' || c == '=' || c == '_';
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
+                       c == '-' || c == '+' || c == '=' || c == '_';
     if (plain) out += c;
   }
   return out;
@@ -48,14 +49,18 @@ class Planner {
       return;
     }
     const SizeDistribution& sizes = part.base.particles.sizes;
-    if (study.reference_radius) part.reference_radius = *study.reference_radius;
-    else if (sizes.kind == SizeDistribution::Kind::mono && sizes.radius > 0.0) part.reference_radius = sizes.radius;
+    if (study.reference_radius)
+      part.reference_radius = *study.reference_radius;
+    else if (sizes.kind == SizeDistribution::Kind::mono && sizes.radius > 0.0)
+      part.reference_radius = sizes.radius;
     else {
-      problem(study.base_where, "study.reference_radius", "is missing; allowed: the radius that the base case of a size "
+      problem(study.base_where, "study.reference_radius",
+              "is missing; allowed: the radius that the base case of a size "
               "distribution or of a particle file stands for");
       return;
     }
-    if (study.reference_radius && sizes.kind == SizeDistribution::Kind::mono && sizes.radius != *study.reference_radius) {
+    if (study.reference_radius && sizes.kind == SizeDistribution::Kind::mono &&
+        sizes.radius != *study.reference_radius) {
       problem(study.base_where, "study.reference_radius",
               fmt::format("is {}, but the base case has spheres of {}; allowed: leave it out, or the same",
                           radius_text(*study.reference_radius), radius_text(sizes.radius)));
@@ -71,7 +76,9 @@ class Planner {
   }
 
  private:
-  void problem(const Position& where, const std::string& key, const std::string& what) { problems_.add(where, key, what); }
+  void problem(const Position& where, const std::string& key, const std::string& what) {
+    problems_.add(where, key, what);
+  }
 
   void add_block(PlannedPart& part, const CurveSpec& spec) {
     const std::vector<double> radii = spec.radii.empty() ? std::vector{part.reference_radius} : spec.radii;
@@ -101,7 +108,8 @@ class Planner {
               if (spec.adhesion.size() > 1) curve.label += fmt::format(" b={:g}", b);
               if (spec.time_step.size() > 1) curve.label += fmt::format(" dt~R^{:g}", c);
               for (const VariedKey& key : spec.vary)
-                if (key.values.size() > 1) curve.label += fmt::format(" {}={}", last_key(key.key), plain_value(variant.at(key.key)));
+                if (key.values.size() > 1)
+                  curve.label += fmt::format(" {}={}", last_key(key.key), plain_value(variant.at(key.key)));
               add_jobs(part, spec, curve);
               part.curves.push_back(std::move(curve));
             }
@@ -119,7 +127,8 @@ class Planner {
         for (std::string& change : scaling_overrides(unscaled, curve.powers, lambda)) all.push_back(std::move(change));
         all.push_back("case.seed=" + std::to_string(seed));
         if (!unscaled.particles.file.empty())  // the case moves to another folder
-          all.push_back("particles.file=\"" + std::filesystem::absolute(study.base.parent_path() / unscaled.particles.file).string() + "\"");
+          all.push_back("particles.file=\"" +
+                        std::filesystem::absolute(study.base.parent_path() / unscaled.particles.file).string() + "\"");
         Case c = read_case(study.base, all);
         // Without the comments on overrides: how a case came about must not make it another run.
         const std::string text = to_toml(parse_document(c.text, "case.toml"));
@@ -142,14 +151,18 @@ class Planner {
   std::size_t job(const PlannedPart& part, const CurveSpec& spec, const PlannedCurve& curve, const Case& c,
                   std::uint64_t seed, int repeat) {
     const Study& study = *part.study;
-    const std::string identity = c.text + fmt::format("\n#{} {}", repeat, repeat > 0 ? study.name + study.base.string() : "");
+    const std::string identity =
+        c.text + fmt::format("\n#{} {}", repeat, repeat > 0 ? study.name + study.base.string() : "");
     if (const auto known = known_.find(identity); known != known_.end()) return known->second;
-    std::string name = (repeat > 0 ? "timed-" : "") + path_part(study.base.stem().string()) + fmt::format("-R{:g}mm", 1e3 * curve.radius);
+    std::string name = (repeat > 0 ? "timed-" : "") + path_part(study.base.stem().string()) +
+                       fmt::format("-R{:g}mm", 1e3 * curve.radius);
     const bool scaled = curve.radius != part.reference_radius;
     if (scaled) name += fmt::format("-a{:g}-b{:g}", curve.powers.stiffness, curve.powers.adhesion);
     if (scaled && curve.powers.time_step != 0.0) name += fmt::format("-dt{:g}", curve.powers.time_step);
     for (const auto& [key, value] : curve.varied) name += "-" + path_part(last_key(key) + "=" + plain_value(value));
-    for (const std::string& text : spec.set) name += "-" + path_part(last_key(text.substr(0, text.find('='))) + "=" + plain_value(text.substr(text.find('=') + 1)));
+    for (const std::string& text : spec.set)
+      name += "-" +
+              path_part(last_key(text.substr(0, text.find('='))) + "=" + plain_value(text.substr(text.find('=') + 1)));
     name += fmt::format("-s{}", seed);
     if (repeat > 0) name += fmt::format("-t{}", repeat);
     std::string unique = name;
@@ -158,7 +171,8 @@ class Planner {
     added.name = unique;
     added.c = c;
     const double dt = c.time.step ? *c.time.step : first_step(c).dt;
-    const double spheres = static_cast<double>(c.particles.table ? static_cast<std::int64_t>(c.particles.table->size()) : c.particles.count);
+    const double spheres = static_cast<double>(c.particles.table ? static_cast<std::int64_t>(c.particles.table->size())
+                                                                 : c.particles.count);
     added.weight = spheres / dt;
     added.timed = repeat > 0;
     added.threads = study.threads;

@@ -13,29 +13,29 @@ namespace platen {
 
 // One run.
 struct Job {
-  std::string name;       // of its folder, unique in the study
-  Case c;                 // c.text is the case.toml that the run folder must hold
-  double weight = 0.0;    // expected cost, arbitrary unit: spheres over time step
+  std::string name;     // of its folder, unique in the study
+  Case c;               // c.text is the case.toml that the run folder must hold
+  double weight = 0.0;  // expected cost, arbitrary unit: spheres over time step
   bool timed = false;
   int threads = 1;
 };
 
 // One curve: one point of the product of a [[curve]], with a run for every seed (timed: and repetition).
 struct PlannedCurve {
-  std::string label;                         // unique in its part: "quadratic R=3 mm"
-  std::string block;                         // name of its [[curve]]
-  double radius = 0.0;                       // [m]
+  std::string label;    // unique in its part: "quadratic R=3 mm"
+  std::string block;    // name of its [[curve]]
+  double radius = 0.0;  // [m]
   ScalingPowers powers;
-  std::map<std::string, std::string> varied; // key -> TOML value
-  std::vector<std::uint64_t> seeds;          // of each run
-  std::vector<std::size_t> jobs;             // of each run: place in StudyPlan::jobs
-  std::size_t reference = 0;                 // place in PlannedPart::curves of what it is compared with
+  std::map<std::string, std::string> varied;  // key -> TOML value
+  std::vector<std::uint64_t> seeds;           // of each run
+  std::vector<std::size_t> jobs;              // of each run: place in StudyPlan::jobs
+  std::size_t reference = 0;                  // place in PlannedPart::curves of what it is compared with
 };
 
 struct PlannedPart {
   const Study* study = nullptr;
   Case base;
-  double reference_radius = 0.0;             // [m]
+  double reference_radius = 0.0;  // [m]
   std::vector<PlannedCurve> curves;
 };
 

@@ -147,11 +147,13 @@ class Runner {
     const fs::path folder = run_folder(options_.folder, job), file = options_.folder / "cases" / (job.name + ".toml");
     write_whole_file(file, job.c.text);
     wait_until_free(folder);
-    std::vector<std::string> words{"platen", "run", file.string(), "-o", folder.string(), "--threads",
-                                   std::to_string(job.threads), "--force", "--quiet"};
+    std::vector<std::string> words{
+        "platen",  "run",    file.string(), "-o", folder.string(), "--threads", std::to_string(job.threads),
+        "--force", "--quiet"};
     outcomes_[k].state = JobState::running;
     const std::optional<double> steal = job.timed ? steal_seconds() : std::nullopt;
-    children_.push_back({start(options_.program, words, options_.folder / "logs" / (job.name + ".txt")), k, Clock::now(), steal});
+    children_.push_back(
+        {start(options_.program, words, options_.folder / "logs" / (job.name + ".txt")), k, Clock::now(), steal});
     newest_ = job.name;
   }
 
@@ -186,7 +188,8 @@ class Runner {
       done_seconds_ += outcome.wall_seconds;
       if (child.steal) {
         if (const auto now = steal_seconds()) outcome.steal_seconds = *now - *child.steal;
-        const nlohmann::json timing = {{"wall_seconds", outcome.wall_seconds}, {"steal_seconds", outcome.steal_seconds.value_or(0.0)}};
+        const nlohmann::json timing = {{"wall_seconds", outcome.wall_seconds},
+                                       {"steal_seconds", outcome.steal_seconds.value_or(0.0)}};
         write_whole_file(run_folder(options_.folder, job) / "timing.json", timing.dump(2) + "\n");
       }
     } else {
@@ -217,7 +220,8 @@ class Runner {
       for (const Child& child : children_)
         under_way += std::min(0.95 * plan_.jobs[child.job].weight, rate * since(child.begin));
       const double left = std::max(0.0, all_weight_ - done_weight_ - under_way) / rate;
-      p.seconds_left = left / std::max<double>(1.0, std::min<double>(options_.jobs, static_cast<double>(p.jobs - finished_)));
+      p.seconds_left =
+          left / std::max<double>(1.0, std::min<double>(options_.jobs, static_cast<double>(p.jobs - finished_)));
     }
     p.fraction = all_weight_ > 0.0 ? (done_weight_ + under_way) / all_weight_ : 1.0;
     options_.progress(p);
@@ -240,12 +244,15 @@ fs::path run_folder(const fs::path& study_folder, const Job& job) { return study
 bool is_done(const fs::path& study_folder, const Job& job) {
   const fs::path folder = run_folder(study_folder, job);
   std::error_code ignored;
-  if (!fs::is_regular_file(folder / "summary.json", ignored) || text_of(folder / "case.toml") != job.c.text) return false;
+  if (!fs::is_regular_file(folder / "summary.json", ignored) || text_of(folder / "case.toml") != job.c.text)
+    return false;
   const nlohmann::json summary = nlohmann::json::parse(text_of(folder / "summary.json"), nullptr, false);
   return summary.is_object() && summary.contains("exit_code") && summary["exit_code"] == 0;
 }
 
-std::vector<JobOutcome> run_jobs(const StudyPlan& plan, const RunnerOptions& options) { return Runner(plan, options).run(); }
+std::vector<JobOutcome> run_jobs(const StudyPlan& plan, const RunnerOptions& options) {
+  return Runner(plan, options).run();
+}
 
 std::optional<double> steal_seconds() {
   std::ifstream stat("/proc/stat");

@@ -22,27 +22,28 @@ enum class JobState { waiting, running, kept, done, failed, stopped };
 
 struct JobOutcome {
   JobState state = JobState::waiting;
-  int exit_code = 0;               // of a failed job; the signal's number + 128 where one ended it
-  std::string message;             // last line that a failed job printed
-  double wall_seconds = 0.0;       // of this process's run of it
-  std::optional<double> steal_seconds;  // timed jobs: taken by other guests of the machine meanwhile, over all its cores
+  int exit_code = 0;          // of a failed job; the signal's number + 128 where one ended it
+  std::string message;        // last line that a failed job printed
+  double wall_seconds = 0.0;  // of this process's run of it
+  std::optional<double>
+      steal_seconds;  // timed jobs: taken by other guests of the machine meanwhile, over all its cores
 };
 
 struct StudyProgress {
   std::size_t jobs = 0, finished = 0, failed = 0, running = 0;
-  double fraction = 0.0;                // of the expected cost
-  double wall_seconds = 0.0;            // since the study was started
-  std::optional<double> seconds_left;   // estimated once a job has ended
-  std::string newest;                   // name of the job that was started or ended last
+  double fraction = 0.0;               // of the expected cost
+  double wall_seconds = 0.0;           // since the study was started
+  std::optional<double> seconds_left;  // estimated once a job has ended
+  std::string newest;                  // name of the job that was started or ended last
 };
 
 struct RunnerOptions {
   std::filesystem::path folder;                      // of the study
   std::filesystem::path program = "/proc/self/exe";  // platen
   int jobs = 1;
-  std::function<void(const StudyProgress&)> progress;          // several times a second; may be empty
-  std::function<void(const Job&, const JobOutcome&)> ended;    // may be empty
-  const std::atomic<int>* stop_signal = nullptr;     // non-zero: children are told to stop, the rest is not started
+  std::function<void(const StudyProgress&)> progress;        // several times a second; may be empty
+  std::function<void(const Job&, const JobOutcome&)> ended;  // may be empty
+  const std::atomic<int>* stop_signal = nullptr;  // non-zero: children are told to stop, the rest is not started
 };
 
 std::filesystem::path run_folder(const std::filesystem::path& study_folder, const Job& job);

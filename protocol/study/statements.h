@@ -11,11 +11,11 @@
 namespace platen {
 
 struct Statement {
-  std::string part;            // name of the study
-  std::string figure;          // "4", "filling", "S2"
-  std::string text;            // what must hold
-  std::string number;          // what was found
-  std::optional<bool> holds;   // empty: cannot be judged; `number` says why
+  std::string part;           // name of the study
+  std::string figure;         // "4", "filling", "S2"
+  std::string text;           // what must hold
+  std::string number;         // what was found
+  std::optional<bool> holds;  // empty: cannot be judged; `number` says why
 };
 
 // Names that a study may ask for: figures-4-7, figures-8-10, figure-11, figures-12-14, quasi-static, similarity-2,

@@ -26,7 +26,8 @@ void inside_scatter(Judge& judge, const std::string& figure, const MeasuredCurve
   if (!std::isfinite(change)) return;  // this case has no such stage
   const double scatter = Judge::deviation(&reference, scalar);
   if (!std::isfinite(scatter))
-    return judge.say(figure, text, fmt::format("{:+.3g} {} (scatter unknown, needs two seeds)", scale * change, unit), std::nullopt);
+    return judge.say(figure, text, fmt::format("{:+.3g} {} (scatter unknown, needs two seeds)", scale * change, unit),
+                     std::nullopt);
   judge.say(figure, text, fmt::format("{:+.3g} {}, scatter {:.3g} {}", scale * change, unit, scale * scatter, unit),
             std::abs(change) <= scatter);
 }
@@ -52,7 +53,8 @@ void judge_figure_11(Judge& judge, const StudyPlan& plan) {
     by_step[curve->planned->powers.time_step][curve->planned->radius] = curve;
     // The reference has the same step under every power.
     if (curve->planned->radius == judge.part().plan->reference_radius)
-      for (const MeasuredCurve* other : judge.plain()) by_step[other->planned->powers.time_step][curve->planned->radius] = curve;
+      for (const MeasuredCurve* other : judge.plain())
+        by_step[other->planned->powers.time_step][curve->planned->radius] = curve;
   }
   for (const auto& [power, curves] : by_step) {
     const std::string how = power == 0.0 ? "equal time steps" : fmt::format("time step ~ R^{:g}", power);
@@ -70,35 +72,45 @@ void judge_figure_11(Judge& judge, const StudyPlan& plan) {
       last = t;
       for (const double s : curve->steal_seconds) steal = std::max(steal, s);
     }
-    judge.say("11", how + ": run time falls with R (medians)", times + fmt::format("; steal time of a run at most {:.1f} s", steal), falls);
+    judge.say("11", how + ": run time falls with R (medians)",
+              times + fmt::format("; steal time of a run at most {:.1f} s", steal), falls);
     const MeasuredCurve* small = curves.begin()->second;
     const MeasuredCurve* large = curves.rbegin()->second;
-    const auto count = [&](const MeasuredCurve* c) { return static_cast<double>(plan.jobs[c->jobs.front()].c.particles.count); };
-    const std::string text = fmt::format("{}: run time from {:g} to {:g} mm falls more than sevenfold (spheres alone: {:.2f})", how,
-                                         1e3 * small->planned->radius, 1e3 * large->planned->radius, count(small) / count(large));
+    const auto count = [&](const MeasuredCurve* c) {
+      return static_cast<double>(plan.jobs[c->jobs.front()].c.particles.count);
+    };
+    const std::string text =
+        fmt::format("{}: run time from {:g} to {:g} mm falls more than sevenfold (spheres alone: {:.2f})", how,
+                    1e3 * small->planned->radius, 1e3 * large->planned->radius, count(small) / count(large));
     const double ratio = median(small->wall_seconds) / median(large->wall_seconds);
-    if (std::isfinite(ratio)) judge.say("11", text, fmt::format("{:.2f}", ratio), ratio > 7.0);
-    else judge.missing("11", text);
+    if (std::isfinite(ratio))
+      judge.say("11", text, fmt::format("{:.2f}", ratio), ratio > 7.0);
+    else
+      judge.missing("11", text);
   }
 }
 
 void judge_quasi_static(Judge& judge) {
   for (const MeasuredCurve& curve : judge.part().curves) {
     if (curve.runs.empty()) continue;
-    judge.number("quasi-static", curve.planned->label + ": strain rate", Judge::mean(&curve, "strain_rate"), {.high = 0.1}, 4, "1/s");
+    judge.number("quasi-static", curve.planned->label + ": strain rate", Judge::mean(&curve, "strain_rate"),
+                 {.high = 0.1}, 4, "1/s");
     const double from = Judge::mean(&curve, "quasi_static_stress");
     const std::string text = curve.planned->label + ": inertial number below 1e-4 at the end of loading";
     const double inertial = Judge::mean(&curve, "inertial_peak");
     if (std::isfinite(inertial))
-      judge.say("quasi-static", text, fmt::format("{:.2g}, below 1e-4 {}", inertial,
-                std::isfinite(from) ? fmt::format("from {:.2f} kPa on", 1e-3 * from) : "nowhere"), inertial < 1e-4);
+      judge.say("quasi-static", text,
+                fmt::format("{:.2g}, below 1e-4 {}", inertial,
+                            std::isfinite(from) ? fmt::format("from {:.2f} kPa on", 1e-3 * from) : "nowhere"),
+                inertial < 1e-4);
     const MeasuredCurve& reference = judge.part().curves[curve.planned->reference];
     if (&reference == &curve || judge.is_plain(curve) || reference.runs.empty()) continue;
     inside_scatter(judge, "quasi-static", curve, reference, "strain_peak", "strain at the end of loading", 100.0, "%");
     inside_scatter(judge, "quasi-static", curve, reference, "strength", "strength", 1e-3, "kPa");
     const double change = std::abs(Judge::mean(&curve, "strain_peak") / Judge::mean(&reference, "strain_peak") - 1.0);
     if (curve.planned->label.find("speed") != std::string::npos)
-      judge.number("quasi-static", curve.planned->label + ": change of the strain at the end of loading, of it", change, {.high = 0.02}, 2, "%", 100.0);
+      judge.number("quasi-static", curve.planned->label + ": change of the strain at the end of loading, of it", change,
+                   {.high = 0.02}, 2, "%", 100.0);
   }
 }
 
@@ -111,8 +123,10 @@ void judge_similarity_2(Judge& judge) {
     const double lambda = R / judge.part().plan->reference_radius;
     const MeasuredCurve* scaled = judge.scaled(R, 1.0, std::nullopt);
     const MeasuredCurve* unscaled = judge.scaled(R, 0.0, std::nullopt);
-    const std::string text = fmt::format("{}: the unscaled bed at a stress has the strain of the scaled bed at {:g} times the "
-                                         "stress, RMS distance below the scatter over seeds", size_text(R), lambda);
+    const std::string text = fmt::format(
+        "{}: the unscaled bed at a stress has the strain of the scaled bed at {:g} times the "
+        "stress, RMS distance below the scatter over seeds",
+        size_text(R), lambda);
     if (scaled == nullptr || unscaled == nullptr) {
       judge.missing("S2", text);
       continue;
@@ -124,12 +138,15 @@ void judge_similarity_2(Judge& judge) {
       found.push_back(strain_by_porosity(porosity, zero));
     }
     const auto error = collapse_error(expected, found);
-    if (!error) judge.missing("S2", text);
+    if (!error)
+      judge.missing("S2", text);
     else if (!error->in_scatter)
-      judge.say("S2", text, fmt::format("{:.3f} % strain (scatter unknown, needs two seeds)", 100.0 * error->of_means), std::nullopt);
+      judge.say("S2", text, fmt::format("{:.3f} % strain (scatter unknown, needs two seeds)", 100.0 * error->of_means),
+                std::nullopt);
     else {
       const double sigma = error->error / *error->in_scatter;
-      judge.say("S2", text, fmt::format("{:.3f} % strain, scatter {:.3f} %", 100.0 * error->of_means, 100.0 * sigma), error->of_means <= sigma);
+      judge.say("S2", text, fmt::format("{:.3f} % strain, scatter {:.3f} %", 100.0 * error->of_means, 100.0 * sigma),
+                error->of_means <= sigma);
     }
   }
 }
@@ -137,14 +154,17 @@ void judge_similarity_2(Judge& judge) {
 void judge_similarity_3(Judge& judge) {
   for (const CollapseRow& row : judge.part().collapse) {
     const std::string text = fmt::format("\"{}\" equals \"{}\" in {}, RMS distance below the scatter over seeds",
-                                         judge.part().curves[row.curve].planned->label, judge.part().curves[row.reference].planned->label, row.observable);
+                                         judge.part().curves[row.curve].planned->label,
+                                         judge.part().curves[row.reference].planned->label, row.observable);
     const std::string unit = observable_kind(row.observable).y_unit == "Pa" ? " Pa" : "";
     if (!row.error.in_scatter) {
-      judge.say("S3", text, fmt::format("{:.3g}{} (scatter unknown, needs two seeds)", row.error.of_means, unit), std::nullopt);
+      judge.say("S3", text, fmt::format("{:.3g}{} (scatter unknown, needs two seeds)", row.error.of_means, unit),
+                std::nullopt);
       continue;
     }
     const double sigma = row.error.error / *row.error.in_scatter;
-    judge.say("S3", text, fmt::format("{:.3g}{}, scatter {:.3g}{}", row.error.of_means, unit, sigma, unit), row.error.of_means <= sigma);
+    judge.say("S3", text, fmt::format("{:.3g}{}, scatter {:.3g}{}", row.error.of_means, unit, sigma, unit),
+              row.error.of_means <= sigma);
   }
 }
 
@@ -153,13 +173,17 @@ void judge_cross_checks(Judge& judge) {
     if (curve.runs.empty()) continue;
     const std::string& label = curve.planned->label;
     const double weight = Judge::mean(&curve, "weight_over_area");
-    const double difference = Judge::mean(&curve, "stress_difference"), unloaded = Judge::mean(&curve, "stress_difference_unloaded");
+    const double difference = Judge::mean(&curve, "stress_difference"),
+                 unloaded = Judge::mean(&curve, "stress_difference_unloaded");
     if (std::isfinite(difference))
-      judge.number("checks", label + ": bottom minus top stress over weight/area, end of loading", difference / weight, {0.98, 1.02}, 4);
+      judge.number("checks", label + ": bottom minus top stress over weight/area, end of loading", difference / weight,
+                   {0.98, 1.02}, 4);
     if (std::isfinite(unloaded))
-      judge.number("checks", label + ": bottom minus top stress over weight/area, end of unloading", unloaded / weight, {0.98, 1.02}, 4);
+      judge.number("checks", label + ": bottom minus top stress over weight/area, end of unloading", unloaded / weight,
+                   {0.98, 1.02}, 4);
     const double overlap = Judge::mean(&curve, "largest_overlap");
-    if (std::isfinite(overlap)) judge.number("checks", label + ": largest overlap over the diameter", overlap, {.high = 0.25}, 1, "%", 100.0);
+    if (std::isfinite(overlap))
+      judge.number("checks", label + ": largest overlap over the diameter", overlap, {.high = 0.25}, 1, "%", 100.0);
   }
 }
 
@@ -167,15 +191,19 @@ void judge_scans(Judge& judge) {
   for (const ScanResult& scan : judge.part().scans) {
     const bool stiffness = scan.power == ScanSpec::Power::stiffness;
     const double wanted = stiffness ? 1.0 : 2.0;
-    const std::string what = fmt::format("{} of {}, {}", stiffness ? "stiffness power" : "adhesion power", size_text(scan.radius), scan.observable);
+    const std::string what = fmt::format("{} of {}, {}", stiffness ? "stiffness power" : "adhesion power",
+                                         size_text(scan.radius), scan.observable);
     if (std::find(scan.powers.begin(), scan.powers.end(), wanted) != scan.powers.end())
       judge.say("scan", fmt::format("{}: {:g} has the least collapse error of the tried ones", what, wanted),
                 fmt::format("{:g}", scan.best_tried), scan.best_tried == wanted);
     const std::string text = fmt::format("{}: the minimum lies at {:g}, within twice its uncertainty", what, wanted);
-    if (!scan.minimum || !scan.minimum->inside) judge.say("scan", text, "no minimum inside the scan", std::nullopt);
-    else if (!std::isfinite(scan.minimum->uncertainty)) judge.say("scan", text, fmt::format("{:.3f} (uncertainty unknown)", scan.minimum->power), std::nullopt);
-    else judge.say("scan", text, fmt::format("{:.3f} +- {:.3f}", scan.minimum->power, scan.minimum->uncertainty),
-                   std::abs(scan.minimum->power - wanted) <= 2.0 * scan.minimum->uncertainty);
+    if (!scan.minimum || !scan.minimum->inside)
+      judge.say("scan", text, "no minimum inside the scan", std::nullopt);
+    else if (!std::isfinite(scan.minimum->uncertainty))
+      judge.say("scan", text, fmt::format("{:.3f} (uncertainty unknown)", scan.minimum->power), std::nullopt);
+    else
+      judge.say("scan", text, fmt::format("{:.3f} +- {:.3f}", scan.minimum->power, scan.minimum->uncertainty),
+                std::abs(scan.minimum->power - wanted) <= 2.0 * scan.minimum->uncertainty);
   }
 }
 

@@ -73,10 +73,10 @@ double mean_of(const std::vector<double>& y) {
   return y.empty() ? no_value : std::accumulate(y.begin(), y.end(), 0.0) / static_cast<double>(y.size());
 }
 
-void judge_profile(Judge& judge, const MeasuredCurve* reference, const MeasuredCurve* scaled, const MeasuredCurve* unscaled,
-                   const std::string& size) {
-  judge.number("6", size + " scaled: RMS distance of the porosity profile from the reference", Judge::distance(reference, scaled, "porosity_height"),
-               {.high = 0.006}, 4);
+void judge_profile(Judge& judge, const MeasuredCurve* reference, const MeasuredCurve* scaled,
+                   const MeasuredCurve* unscaled, const std::string& size) {
+  judge.number("6", size + " scaled: RMS distance of the porosity profile from the reference",
+               Judge::distance(reference, scaled, "porosity_height"), {.high = 0.006}, 4);
   const Curve a = mean_profile(reference), b = mean_profile(unscaled);
   double least = no_value;
   for (std::size_t k = 0; k < a.y.size() && a.y.size() == b.y.size(); ++k) least = std::fmin(least, a.y[k] - b.y[k]);
@@ -92,36 +92,46 @@ void judge_profile(Judge& judge, const MeasuredCurve* reference, const MeasuredC
 void judge_figures_4_7(Judge& judge) {
   const MeasuredCurve* ref = judge.reference();
   judge.number("filling", "reference: porosity after the rain", Judge::mean(ref, "porosity_filled"), {0.41, 0.44}, 4);
-  judge.number("filling", "reference: porosity at 0.1 kPa after vibration", Judge::mean(ref, "porosity_at_100_pa"), {0.38, 0.41}, 4);
-  judge.number("filling", "all sizes: span of the porosity at 0.1 kPa", span(judge.plain(), "porosity_at_100_pa"), {.high = 0.008}, 4);
-  judge.number("4", "reference: strain at the end of loading", Judge::mean(ref, "strain_peak"), {0.05, 0.08}, 2, "%", 100.0);
+  judge.number("filling", "reference: porosity at 0.1 kPa after vibration", Judge::mean(ref, "porosity_at_100_pa"),
+               {0.38, 0.41}, 4);
+  judge.number("filling", "all sizes: span of the porosity at 0.1 kPa", span(judge.plain(), "porosity_at_100_pa"),
+               {.high = 0.008}, 4);
+  judge.number("4", "reference: strain at the end of loading", Judge::mean(ref, "strain_peak"), {0.05, 0.08}, 2, "%",
+               100.0);
   const double residual = Judge::mean(ref, "strain_residual") / Judge::mean(ref, "strain_peak");
   judge.number("4", "reference: residual over peak strain", residual, {0.75, 0.85}, 3);
-  judge.number("4", "reference: unloading is much stiffer, strain given back over strain of loading", 1.0 - residual, {.high = 0.5}, 3);
+  judge.number("4", "reference: unloading is much stiffer, strain given back over strain of loading", 1.0 - residual,
+               {.high = 0.5}, 3);
   judge.number("5", "reference: porosity at the end of loading", Judge::mean(ref, "porosity_peak"), {0.335, 0.36}, 4);
-  judge.number("7", "reference: coordination number at the end of loading", Judge::mean(ref, "coordination_peak"), {5.9, 6.5}, 3);
+  judge.number("7", "reference: coordination number at the end of loading", Judge::mean(ref, "coordination_peak"),
+               {5.9, 6.5}, 3);
   const std::vector<double> above = Judge::difference(ref, "coordination", ref, "coordination_unloading");
-  judge.number("7", "reference: the unloading branch lies above the loading branch, least difference", smallest(above), {.low = 0.0}, 3);
+  judge.number("7", "reference: the unloading branch lies above the loading branch, least difference", smallest(above),
+               {.low = 0.0}, 3);
   for (const double R : judge.radii()) {
     const std::string size = size_text(R);
     const MeasuredCurve* scaled = judge.scaled(R, 1.0, std::nullopt);
     const MeasuredCurve* unscaled = judge.scaled(R, 0.0, std::nullopt);
-    judge.number("4", size + " scaled: strain at the end of loading over the reference's", ratio(scaled, ref, "strain_peak"), {0.9, 1.1}, 3);
-    judge.number("4", size + ": unscaled is softer, strain over the scaled one's", ratio(unscaled, scaled, "strain_peak"), {1.2, 1.45}, 3);
-    judge.number("5", size + " scaled: porosity at the end of loading minus the reference's, size", std::abs(minus(scaled, ref, "porosity_peak")),
-                 {.high = 0.006}, 4);
-    judge.number("5", size + " unscaled: porosity at the end of loading lower than the reference's by", minus(ref, unscaled, "porosity_peak"),
-                 {0.008, 0.025}, 4);
-    judge.number("5", size + " unscaled: lower at every stress, least difference", smallest(Judge::difference(unscaled, "porosity", ref, "porosity")),
-                 {.low = 0.0}, 4);
-    judge.number("5", size + ": equal start, span of the porosity at 1 kPa", span({ref, scaled, unscaled}, "porosity_start"), {.high = 0.008}, 4);
+    judge.number("4", size + " scaled: strain at the end of loading over the reference's",
+                 ratio(scaled, ref, "strain_peak"), {0.9, 1.1}, 3);
+    judge.number("4", size + ": unscaled is softer, strain over the scaled one's",
+                 ratio(unscaled, scaled, "strain_peak"), {1.2, 1.45}, 3);
+    judge.number("5", size + " scaled: porosity at the end of loading minus the reference's, size",
+                 std::abs(minus(scaled, ref, "porosity_peak")), {.high = 0.006}, 4);
+    judge.number("5", size + " unscaled: porosity at the end of loading lower than the reference's by",
+                 minus(ref, unscaled, "porosity_peak"), {0.008, 0.025}, 4);
+    judge.number("5", size + " unscaled: lower at every stress, least difference",
+                 smallest(Judge::difference(unscaled, "porosity", ref, "porosity")), {.low = 0.0}, 4);
+    judge.number("5", size + ": equal start, span of the porosity at 1 kPa",
+                 span({ref, scaled, unscaled}, "porosity_start"), {.high = 0.008}, 4);
     judge_profile(judge, ref, scaled, unscaled, size);
-    judge.number("7", size + ": coordination number at the end of loading, unscaled minus scaled", minus(unscaled, scaled, "coordination_peak"),
-                 {0.15, 0.45}, 3);
+    judge.number("7", size + ": coordination number at the end of loading, unscaled minus scaled",
+                 minus(unscaled, scaled, "coordination_peak"), {0.15, 0.45}, 3);
     judge.number("7", size + " scaled: coordination number minus the reference's at the end of loading, size",
                  std::abs(minus(scaled, ref, "coordination_peak")), {.high = 0.12}, 3);
     judge.number("7", size + " scaled: largest distance from the reference's unloading branch",
-                 largest_size(Judge::difference(ref, "coordination_unloading", scaled, "coordination_unloading")), {.high = 0.12}, 3);
+                 largest_size(Judge::difference(ref, "coordination_unloading", scaled, "coordination_unloading")),
+                 {.high = 0.12}, 3);
   }
 }
 
@@ -133,32 +143,43 @@ void judge_figures_8_10(Judge& judge) {
     const MeasuredCurve* linear = judge.scaled(R, 1.0, 1.0);
     const MeasuredCurve* quadratic = judge.scaled(R, 1.0, 2.0);
     const MeasuredCurve* cubic = judge.scaled(R, 1.0, 3.0);
-    judge.number("8", size + " quadratic: strain at the end of loading over the reference's", ratio(quadratic, ref, "strain_peak"), {0.88, 1.12}, 3);
+    judge.number("8", size + " quadratic: strain at the end of loading over the reference's",
+                 ratio(quadratic, ref, "strain_peak"), {0.88, 1.12}, 3);
     judge.number("9", size + " quadratic: porosity at the strain zero minus the reference's, size",
                  std::abs(minus(quadratic, ref, "porosity_at_zero")), {.high = 0.015}, 4);
-    judge.number("10", size + " quadratic: strength over the reference's", ratio(quadratic, ref, "strength"), {0.85, 1.15}, 3);
-    judge.number("10", size + " quadratic: initial stiffness over the reference's", ratio(quadratic, ref, "initial_stiffness"), {0.85, 1.15}, 3);
+    judge.number("10", size + " quadratic: strength over the reference's", ratio(quadratic, ref, "strength"),
+                 {0.85, 1.15}, 3);
+    judge.number("10", size + " quadratic: initial stiffness over the reference's",
+                 ratio(quadratic, ref, "initial_stiffness"), {0.85, 1.15}, 3);
     if (linear == nullptr && cubic == nullptr) continue;
     // Spheres smaller than the reference turn the order round.
     const double sign = R > judge.part().plan->reference_radius ? 1.0 : -1.0;
-    const auto ordered = [&](const std::string& figure, const std::string& what, const std::string& scalar, double scale, int decimals) {
+    const auto ordered = [&](const std::string& figure, const std::string& what, const std::string& scalar,
+                             double scale, int decimals) {
       const double a = Judge::mean(linear, scalar), b = Judge::mean(quadratic, scalar), c = Judge::mean(cubic, scalar);
-      const std::string text = size + ": " + what + (sign > 0.0 ? ", linear < quadratic < cubic" : ", linear > quadratic > cubic");
+      const std::string text =
+          size + ": " + what + (sign > 0.0 ? ", linear < quadratic < cubic" : ", linear > quadratic > cubic");
       if (!std::isfinite(a + b + c)) return judge.missing(figure, text);
-      judge.say(figure, text, fmt::format("{}, {}, {}", Judge::shown(linear, scalar, scale, decimals),
-                Judge::shown(quadratic, scalar, scale, decimals), Judge::shown(cubic, scalar, scale, decimals)),
-                sign * (b - a) > 0.0 && sign * (c - b) > 0.0);
+      judge.say(
+          figure, text,
+          fmt::format("{}, {}, {}", Judge::shown(linear, scalar, scale, decimals),
+                      Judge::shown(quadratic, scalar, scale, decimals), Judge::shown(cubic, scalar, scale, decimals)),
+          sign * (b - a) > 0.0 && sign * (c - b) > 0.0);
     };
     ordered("8", "strain at the end of loading [%]", "strain_peak", 100.0, 2);
     ordered("9", "porosity at the strain zero", "porosity_at_zero", 1.0, 4);
-    judge.number("9", size + ": converging, span of the porosity at the end of loading", span({linear, quadratic, cubic}, "porosity_peak"), {.high = 0.02}, 4);
+    judge.number("9", size + ": converging, span of the porosity at the end of loading",
+                 span({linear, quadratic, cubic}, "porosity_peak"), {.high = 0.02}, 4);
     const Bounds low{0.45, 0.8}, high{1.25, 1.65};
-    judge.number("10", size + ": strength, linear over quadratic", ratio(linear, quadratic, "strength"), sign > 0.0 ? low : high, 3);
-    judge.number("10", size + ": strength, cubic over quadratic", ratio(cubic, quadratic, "strength"), sign > 0.0 ? high : low, 3);
+    judge.number("10", size + ": strength, linear over quadratic", ratio(linear, quadratic, "strength"),
+                 sign > 0.0 ? low : high, 3);
+    judge.number("10", size + ": strength, cubic over quadratic", ratio(cubic, quadratic, "strength"),
+                 sign > 0.0 ? high : low, 3);
   }
   for (const MeasuredCurve* curve : judge.plain()) {
-    const double f0 = judge.part().plan->base.particles.law.f0 *
-                      std::pow(curve->planned->radius / judge.part().plan->reference_radius, curve->planned->powers.adhesion);
+    const double f0 =
+        judge.part().plan->base.particles.law.f0 *
+        std::pow(curve->planned->radius / judge.part().plan->reference_radius, curve->planned->powers.adhesion);
     const double d = 2.0 * curve->planned->radius;
     const double x = Judge::mean(curve, "coordination_released") * (1.0 - Judge::mean(curve, "porosity_released"));
     const double y = Judge::mean(curve, "strength") * d * d / std::abs(f0);
@@ -183,27 +204,37 @@ void judge_figures_12_14(Judge& judge) {
   for (const double R : judge.radii()) {
     const std::string size = size_text(R);
     const MeasuredCurve* scaled = judge.scaled(R, 1.0, std::nullopt);
-    judge.number("12", size + ": strain at the end of loading over the reference's", ratio(scaled, ref, "strain_peak"), {0.9, 1.1}, 3);
-    judge.number("12", size + ": slightly lower peak strain, reference minus scaled", minus(ref, scaled, "strain_peak"), {.low = 0.0}, 2, "%", 100.0);
+    judge.number("12", size + ": strain at the end of loading over the reference's", ratio(scaled, ref, "strain_peak"),
+                 {0.9, 1.1}, 3);
+    judge.number("12", size + ": slightly lower peak strain, reference minus scaled", minus(ref, scaled, "strain_peak"),
+                 {.low = 0.0}, 2, "%", 100.0);
     judge.number("13", size + ": largest difference of the porosity over all stresses",
                  largest_size(Judge::difference(ref, "porosity", scaled, "porosity")), {.high = 0.015}, 4);
-    const double start = std::abs(minus(scaled, ref, "porosity_start")), end = std::abs(minus(scaled, ref, "porosity_peak"));
+    const double start = std::abs(minus(scaled, ref, "porosity_start")),
+                 end = std::abs(minus(scaled, ref, "porosity_peak"));
     const std::string converging = size + ": the difference of the porosity shrinks with stress";
-    if (std::isfinite(start + end)) judge.say("13", converging, fmt::format("{:.4f} at 1 kPa, {:.4f} at the end", start, end), end <= start);
-    else judge.missing("13", converging);
-    judge.number("14", size + ": initial stiffness over the reference's", ratio(scaled, ref, "initial_stiffness"), {0.85, 1.15}, 3);
+    if (std::isfinite(start + end))
+      judge.say("13", converging, fmt::format("{:.4f} at 1 kPa, {:.4f} at the end", start, end), end <= start);
+    else
+      judge.missing("13", converging);
+    judge.number("14", size + ": initial stiffness over the reference's", ratio(scaled, ref, "initial_stiffness"),
+                 {0.85, 1.15}, 3);
     const double strength = ratio(scaled, ref, "strength");
-    judge.number("14", size + ": strength minus the reference's (the paper: -9.5 %), size", std::abs(strength - 1.0), {.high = 0.15}, 1, "%", 100.0);
-    judge.number("14", size + ": lower strength than the reference, difference", strength - 1.0, {.high = 0.0}, 1, "%", 100.0);
-    judge.number("14", size + ": equal coordination number at the end of loading, difference", std::abs(minus(scaled, ref, "coordination_peak")),
-                 {.high = 0.12}, 3);
+    judge.number("14", size + ": strength minus the reference's (the paper: -9.5 %), size", std::abs(strength - 1.0),
+                 {.high = 0.15}, 1, "%", 100.0);
+    judge.number("14", size + ": lower strength than the reference, difference", strength - 1.0, {.high = 0.0}, 1, "%",
+                 100.0);
+    judge.number("14", size + ": equal coordination number at the end of loading, difference",
+                 std::abs(minus(scaled, ref, "coordination_peak")), {.high = 0.12}, 3);
     const auto drop = [&](const MeasuredCurve* curve) {
       return Judge::mean(curve, "coordination_unloaded") - Judge::mean(curve, "coordination_released");
     };
-    const std::string text = size + ": the coordination number drops more than the reference's when the sides are removed";
+    const std::string text =
+        size + ": the coordination number drops more than the reference's when the sides are removed";
     if (std::isfinite(drop(scaled) + drop(ref)))
       judge.say("14", text, fmt::format("{:.3f} against {:.3f}", drop(scaled), drop(ref)), drop(scaled) > drop(ref));
-    else judge.missing("14", text);
+    else
+      judge.missing("14", text);
   }
 }
 

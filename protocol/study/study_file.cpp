@@ -28,15 +28,18 @@ bool texts(TableReader& table, std::string_view key, std::vector<std::string>& o
   if (entry == nullptr) return false;
   std::vector<std::string> found;
   const CaseValue& value = entry->value;
-  if (value.type == CaseValue::Type::text) found.push_back(value.text);
+  if (value.type == CaseValue::Type::text)
+    found.push_back(value.text);
   else if (value.type == CaseValue::Type::list)
     for (const CaseValue& item : value.items)
       if (item.type == CaseValue::Type::text) found.push_back(item.text);
-  const bool whole = value.type == CaseValue::Type::text ||
-                     (value.type == CaseValue::Type::list && !value.items.empty() && found.size() == value.items.size());
+  const bool whole =
+      value.type == CaseValue::Type::text ||
+      (value.type == CaseValue::Type::list && !value.items.empty() && found.size() == value.items.size());
   if (!whole) {
-    table.error(key, fmt::format("is {}, wrong type; allowed: a string or a list of strings",
-                                 value.type == CaseValue::Type::list ? "not a list of strings" : type_name(value.type)));
+    table.error(key,
+                fmt::format("is {}, wrong type; allowed: a string or a list of strings",
+                            value.type == CaseValue::Type::list ? "not a list of strings" : type_name(value.type)));
     return false;
   }
   out = std::move(found);
@@ -44,7 +47,8 @@ bool texts(TableReader& table, std::string_view key, std::vector<std::string>& o
 }
 
 // As `texts`, of known words only.
-bool words(TableReader& table, std::string_view key, const std::vector<std::string>& known, std::vector<std::string>& out) {
+bool words(TableReader& table, std::string_view key, const std::vector<std::string>& known,
+           std::vector<std::string>& out) {
   std::vector<std::string> found;
   if (!texts(table, key, found)) return false;
   bool good = true;
@@ -65,8 +69,10 @@ void powers(TableReader& table, std::string_view key, std::vector<double>& out) 
   if (entry == nullptr) return;
   constexpr Range sensible{-10.0, 10.0};
   double one = 0.0;
-  if (entry->value.type == CaseValue::Type::list) table.numbers(key, sensible, Need::optional, out);
-  else if (table.number(key, sensible, Need::optional, one)) out = {one};
+  if (entry->value.type == CaseValue::Type::list)
+    table.numbers(key, sensible, Need::optional, out);
+  else if (table.number(key, sensible, Need::optional, one))
+    out = {one};
 }
 
 // Names become names of files.
@@ -74,7 +80,8 @@ bool good_name(TableReader& table, std::string_view key, const std::string& name
   constexpr std::string_view forbidden = "/\\\"'`$\n\r\t,;";
   if (!name.empty() && name.front() != '.' && name.find_first_of(forbidden) == std::string::npos) return true;
   table.error(key, fmt::format("\"{}\" is not a usable name; allowed: a text without / \\ quotes $ , ; that does not "
-                               "begin with a point", name));
+                               "begin with a point",
+                               name));
   return false;
 }
 
@@ -82,14 +89,18 @@ void read_vary(TableReader& curve, std::vector<VariedKey>& out) {
   const CaseEntry* const entry = curve.entry("vary");
   if (entry == nullptr) return;
   if (entry->value.type != CaseValue::Type::table) {
-    curve.error("vary", fmt::format("is {}, wrong type; allowed: a table of lists, as {{ \"particles.law.friction\" = [0.3, 0.5] }}",
-                                    type_name(entry->value.type)));
+    curve.error(
+        "vary",
+        fmt::format("is {}, wrong type; allowed: a table of lists, as {{ \"particles.law.friction\" = [0.3, 0.5] }}",
+                    type_name(entry->value.type)));
     return;
   }
   for (const CaseEntry& varied : entry->value.entries) {
     if (varied.value.type != CaseValue::Type::list || varied.value.items.empty()) {
-      curve.error("vary", fmt::format("{} is not a list of values; allowed: keys of a case in quotes, each with a list, as "
-                                      "{{ \"particles.law.friction\" = [0.3, 0.5] }}", varied.key));
+      curve.error("vary",
+                  fmt::format("{} is not a list of values; allowed: keys of a case in quotes, each with a list, as "
+                              "{{ \"particles.law.friction\" = [0.3, 0.5] }}",
+                              varied.key));
       continue;
     }
     VariedKey key{varied.key, {}};
@@ -128,7 +139,8 @@ void tables(TableReader& root, std::string_view key, Problems& problems, Read&& 
   }
   for (const CaseValue& item : entry->value.items) {
     if (item.type != CaseValue::Type::table) {
-      problems.add(item.where, std::string(key), fmt::format("is {}, wrong type; allowed: a table [[{}]]", type_name(item.type), key));
+      problems.add(item.where, std::string(key),
+                   fmt::format("is {}, wrong type; allowed: a table [[{}]]", type_name(item.type), key));
       continue;
     }
     TableReader table(&item, std::string(key), item.where, problems);
@@ -160,8 +172,10 @@ void read_own(TableReader& root, TableReader& head, Study& study, Problems& prob
     study.base = study.file.parent_path() / base;
     std::error_code ignored;
     if (base.empty() || !fs::is_regular_file(study.base, ignored))
-      head.error("base", fmt::format("the base case \"{}\" does not exist ({}); allowed: a case file, relative to the study file",
-                                     base, study.base.lexically_normal().string()));
+      head.error(
+          "base",
+          fmt::format("the base case \"{}\" does not exist ({}); allowed: a case file, relative to the study file",
+                      base, study.base.lexically_normal().string()));
   }
   head.quantity("reference_radius", Quantity::length, positive, Need::optional, study.reference_radius);
   texts(head, "set", study.set);
@@ -186,9 +200,11 @@ void read_own(TableReader& root, TableReader& head, Study& study, Problems& prob
       table.error("name", fmt::format("\"{}\" is there already; allowed: a name for each curve of its own", name));
     names.push_back(name);
   });
-  if (study.curves.empty()) root.error("curve", "is missing; allowed: at least one [[curve]], the first is the reference");
+  if (study.curves.empty())
+    root.error("curve", "is missing; allowed: at least one [[curve]], the first is the reference");
   for (std::size_t k = 0; k < study.curves.size(); ++k)
-    if (!study.curves[k].against.empty() && std::find(names.begin(), names.end(), study.curves[k].against) == names.end()) {
+    if (!study.curves[k].against.empty() &&
+        std::find(names.begin(), names.end(), study.curves[k].against) == names.end()) {
       const std::string near = nearest_word(study.curves[k].against, names);
       problems.add(study.curves[k].where, "curve.against",
                    fmt::format("there is no curve \"{}\"; allowed: {}{}", study.curves[k].against, quoted(names),
@@ -199,14 +215,16 @@ void read_own(TableReader& root, TableReader& head, Study& study, Problems& prob
     FigureSpec figure;
     if (table.text("name", Need::required, figure.name) && good_name(table, "name", figure.name) &&
         !figure_names.insert(figure.name).second)
-      table.error("name", fmt::format("\"{}\" is there already; allowed: a name for each figure of its own", figure.name));
+      table.error("name",
+                  fmt::format("\"{}\" is there already; allowed: a name for each figure of its own", figure.name));
     table.text("title", Need::optional, figure.title);
     if (!table.has("observables")) table.error("observables", "is missing; allowed: " + quoted(known));
     words(table, "observables", known, figure.observables);
     const bool mixed = std::any_of(figure.observables.begin(), figure.observables.end(), [&](const std::string& o) {
       return observable_kind(o).y_label != observable_kind(figure.observables.front()).y_label;
     });
-    if (mixed) table.error("observables", "have different axes; allowed: one observable, or its loading and unloading branch");
+    if (mixed)
+      table.error("observables", "have different axes; allowed: one observable, or its loading and unloading branch");
     words(table, "curves", names, figure.curves);
     table.refuse_unknown("a figure");
     study.figures.push_back(std::move(figure));
@@ -239,15 +257,16 @@ Study read_one(const fs::path& file, const std::vector<std::string>& overrides, 
   head.text("title", Need::optional, study.title);
   const bool own_seeds = head.has("seeds");
   read_seeds(head, study.seeds);
-  if (seeds) study.seeds = *seeds;
   std::vector<std::string> included;
-  if (head.has("include") && !may_include) head.error("include", "an included study includes others; allowed: one level");
+  if (head.has("include") && !may_include)
+    head.error("include", "an included study includes others; allowed: one level");
   if (may_include && texts(head, "include", included)) {
     for (const std::string& name : included) {
       const fs::path path = file.parent_path() / name;
       if (!fs::is_regular_file(path, ignored)) {
-        head.error("include", fmt::format("the study \"{}\" does not exist ({}); allowed: study files, relative to this one",
-                                          name, path.lexically_normal().string()));
+        head.error("include",
+                   fmt::format("the study \"{}\" does not exist ({}); allowed: study files, relative to this one", name,
+                               path.lexically_normal().string()));
         continue;
       }
       std::optional<std::vector<std::uint64_t>> given;
@@ -262,8 +281,12 @@ Study read_one(const fs::path& file, const std::vector<std::string>& overrides, 
     root.refuse_unknown("a study that includes others");
     return study;
   }
-  if (head.present()) read_own(root, head, study, problems);
-  else for (const char* key : {"curve", "figure", "scan"}) root.has(key);
+  if (head.present())
+    read_own(root, head, study, problems);
+  else
+    for (const char* key : {"curve", "figure", "scan"}) root.has(key);
+  // Run times need repetitions, not other beds: a timed part keeps its own.
+  if (seeds && !study.timed) study.seeds = *seeds;
   head.refuse_unknown("study");
   root.refuse_unknown("a study");
   return study;

@@ -23,49 +23,49 @@ struct VariedKey {
 struct CurveSpec {
   std::string name;
   Position where;
-  std::vector<double> radii;                  // [m]; empty: the reference radius
+  std::vector<double> radii;                                          // [m]; empty: the reference radius
   std::vector<double> stiffness{1.0}, adhesion{2.0}, time_step{0.0};  // powers of R
-  std::optional<double> dashpots;             // power of R; empty: restitution kept
+  std::optional<double> dashpots;                                     // power of R; empty: restitution kept
   std::vector<VariedKey> vary;
-  std::vector<std::string> set;               // `--set` texts
-  std::string against;                        // name of the [[curve]] that it is compared with; empty: the first one
+  std::vector<std::string> set;  // `--set` texts
+  std::string against;           // name of the [[curve]] that it is compared with; empty: the first one
 };
 
 // [[figure]]: one observable of some curves in one picture.
 struct FigureSpec {
   std::string name, title;
-  std::vector<std::string> observables;       // drawn together: loading and unloading
-  std::vector<std::string> curves;            // names of [[curve]]; empty: all
+  std::vector<std::string> observables;  // drawn together: loading and unloading
+  std::vector<std::string> curves;       // names of [[curve]]; empty: all
 };
 
 // [[scan]]: the power of least collapse error.
 struct ScanSpec {
   enum class Power { stiffness, adhesion };
   Power power = Power::stiffness;
-  std::vector<std::string> curves;            // names of [[curve]]; empty: all
-  std::vector<std::string> observables;       // empty: all of the study
+  std::vector<std::string> curves;       // names of [[curve]]; empty: all
+  std::vector<std::string> observables;  // empty: all of the study
 };
 
 struct Study {
   std::string title;
-  std::string name;                           // stem of its file
+  std::string name;  // stem of its file
   std::filesystem::path file;
-  std::string text;                           // as read, overrides applied
-  std::filesystem::path base;                 // base case; empty when it includes others
+  std::string text;            // as read, overrides applied
+  std::filesystem::path base;  // base case; empty when it includes others
   Position base_where;
-  std::optional<double> reference_radius;     // [m]; empty: that of the base case
+  std::optional<double> reference_radius;  // [m]; empty: that of the base case
   std::vector<std::uint64_t> seeds{1};
-  std::vector<std::string> set;               // `--set` texts for all curves
-  std::vector<std::string> observables;       // names from observable_kinds()
-  std::optional<double> strain_zero;          // [Pa]; empty: that of the case's compress stage
-  std::vector<std::string> statements;        // groups of statements to judge, from statement_groups()
-  bool timed = false;                         // runs alone, interleaved, their wall time is a result
-  int repeats = 1;                            // of timed runs
-  int threads = 1;                            // of each run
+  std::vector<std::string> set;          // `--set` texts for all curves
+  std::vector<std::string> observables;  // names from observable_kinds()
+  std::optional<double> strain_zero;     // [Pa]; empty: that of the case's compress stage
+  std::vector<std::string> statements;   // groups of statements to judge, from statement_groups()
+  bool timed = false;                    // runs alone, interleaved, their wall time is a result
+  int repeats = 1;                       // of timed runs
+  int threads = 1;                       // of each run
   std::vector<CurveSpec> curves;
   std::vector<FigureSpec> figures;
   std::vector<ScanSpec> scans;
-  std::vector<Study> parts;                   // include = [...]: these and nothing of its own
+  std::vector<Study> parts;  // include = [...]: these and nothing of its own
 };
 
 // Reads and checks a study file and those that it includes. `overrides` are `--set` texts for the study itself

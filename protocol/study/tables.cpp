@@ -39,14 +39,15 @@ void make_folder(const fs::path& folder) {
 }
 
 std::string curve_cells(const PlannedCurve& curve) {
-  return fmt::format("{},{},{},{}", cell(curve.label), cell(curve.radius), cell(curve.powers.stiffness), cell(curve.powers.adhesion));
+  return fmt::format("{},{},{},{}", cell(curve.label), cell(curve.radius), cell(curve.powers.stiffness),
+                     cell(curve.powers.adhesion));
 }
 constexpr const char* curve_header = "curve,radius [m],stiffness power [-],adhesion power [-]";
 
 void write_curves(const fs::path& folder, const PartResults& part, const std::string& observable) {
   const ObservableKind& kind = observable_kind(observable);
-  std::string text = fmt::format("{},seed,{} [{}],{} [{}],deviation [{}]\n", curve_header, kind.x_label, kind.x_unit, kind.y_label,
-                                 kind.y_unit, kind.y_unit);
+  std::string text = fmt::format("{},seed,{} [{}],{} [{}],deviation [{}]\n", curve_header, kind.x_label, kind.x_unit,
+                                 kind.y_label, kind.y_unit, kind.y_unit);
   bool any = false;
   for (const MeasuredCurve& curve : part.curves) {
     for (std::size_t k = 0; k < curve.runs.size(); ++k) {
@@ -55,19 +56,22 @@ void write_curves(const fs::path& folder, const PartResults& part, const std::st
       any = true;
       const Band band = band_of({found->second});
       for (std::size_t i = 0; i < band.x.size(); ++i)
-        text += fmt::format("{},{},{},{},\n", curve_cells(*curve.planned), curve.seeds[k], cell(band.x[i]), cell(band.mean[i]));
+        text += fmt::format("{},{},{},{},\n", curve_cells(*curve.planned), curve.seeds[k], cell(band.x[i]),
+                            cell(band.mean[i]));
     }
     const std::vector<Curve> seeds = curve.curves(observable);
     if (seeds.size() < 2) continue;
     const Band band = band_of(seeds);
     for (std::size_t i = 0; i < band.x.size(); ++i)
-      text += fmt::format("{},mean,{},{},{}\n", curve_cells(*curve.planned), cell(band.x[i]), cell(band.mean[i]), cell(band.deviation[i]));
+      text += fmt::format("{},mean,{},{},{}\n", curve_cells(*curve.planned), cell(band.x[i]), cell(band.mean[i]),
+                          cell(band.deviation[i]));
   }
   if (any) write_whole_file(folder / (observable + ".csv"), text);
 }
 
 void write_scalars(const fs::path& file, const PartResults& part) {
-  std::string text = std::string(curve_header) + ",quantity,unit,seeds,mean,deviation,reference,over reference,values\n";
+  std::string text =
+      std::string(curve_header) + ",quantity,unit,seeds,mean,deviation,reference,over reference,values\n";
   for (const MeasuredCurve& curve : part.curves) {
     const MeasuredCurve& reference = part.curves[curve.planned->reference];
     for (const ScalarKind& kind : scalar_kinds()) {
@@ -75,32 +79,39 @@ void write_scalars(const fs::path& file, const PartResults& part) {
       if (values.empty()) continue;
       const Spread spread = spread_of(values);
       const double against = others.empty() ? nan : spread_of(others).mean;
-      text += fmt::format("{},{},{},{},{},{},{},{},{}\n", curve_cells(*curve.planned), kind.name, kind.unit, spread.count, cell(spread.mean),
-                          cell(spread.deviation), cell(against), cell(spread.mean / against), list(values));
+      text += fmt::format("{},{},{},{},{},{},{},{},{}\n", curve_cells(*curve.planned), kind.name, kind.unit,
+                          spread.count, cell(spread.mean), cell(spread.deviation), cell(against),
+                          cell(spread.mean / against), list(values));
     }
   }
   write_whole_file(file, text);
 }
 
 void write_collapse(const fs::path& file, const PartResults& part) {
-  std::string text = std::string(curve_header) + ",against,observable,unit,seeds,error,scatter,of means,over range [-],over seed scatter [-],each\n";
+  std::string text =
+      std::string(curve_header) +
+      ",against,observable,unit,seeds,error,scatter,of means,over range [-],over seed scatter [-],each\n";
   for (const CollapseRow& row : part.collapse) {
     const CollapseError& e = row.error;
     text += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", curve_cells(*part.curves[row.curve].planned),
-                        cell(part.curves[row.reference].planned->label), row.observable, observable_kind(row.observable).y_unit, e.each.size(),
-                        cell(e.error), cell(e.scatter), cell(e.of_means), cell(e.relative), cell(e.in_scatter), list(e.each));
+                        cell(part.curves[row.reference].planned->label), row.observable,
+                        observable_kind(row.observable).y_unit, e.each.size(), cell(e.error), cell(e.scatter),
+                        cell(e.of_means), cell(e.relative), cell(e.in_scatter), list(e.each));
   }
   write_whole_file(file, text);
 }
 
 void write_scans(const fs::path& file, const PartResults& part) {
-  std::string text = "scanned power,radius [m],other power [-],observable,powers,errors over range [-],best tried,minimum,uncertainty,error at minimum,inside\n";
+  std::string text =
+      "scanned power,radius [m],other power [-],observable,powers,errors over range [-],best "
+      "tried,minimum,uncertainty,error at minimum,inside\n";
   for (const ScanResult& scan : part.scans) {
     const bool found = scan.minimum.has_value();
-    text += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", scan.power == ScanSpec::Power::stiffness ? "stiffness" : "adhesion", cell(scan.radius),
-                        cell(scan.other_power), scan.observable, list(scan.powers), list(scan.errors), cell(scan.best_tried),
-                        found ? cell(scan.minimum->power) : "", found ? cell(scan.minimum->uncertainty) : "", found ? cell(scan.minimum->error) : "",
-                        found ? (scan.minimum->inside ? "yes" : "no") : "");
+    text += fmt::format(
+        "{},{},{},{},{},{},{},{},{},{},{}\n", scan.power == ScanSpec::Power::stiffness ? "stiffness" : "adhesion",
+        cell(scan.radius), cell(scan.other_power), scan.observable, list(scan.powers), list(scan.errors),
+        cell(scan.best_tried), found ? cell(scan.minimum->power) : "", found ? cell(scan.minimum->uncertainty) : "",
+        found ? cell(scan.minimum->error) : "", found ? (scan.minimum->inside ? "yes" : "no") : "");
   }
   write_whole_file(file, text);
 }
@@ -110,8 +121,8 @@ void write_timing(const fs::path& file, const StudyPlan& plan, const PartResults
   for (const MeasuredCurve& curve : part.curves)
     for (std::size_t k = 0; k < curve.runs.size(); ++k) {
       const Job& job = plan.jobs[curve.jobs[k]];
-      text += fmt::format("{},{},{},{},{},{}\n", curve_cells(*curve.planned), job.name, job.c.particles.count, job.threads,
-                          cell(curve.wall_seconds[k]), cell(curve.steal_seconds[k]));
+      text += fmt::format("{},{},{},{},{},{}\n", curve_cells(*curve.planned), job.name, job.c.particles.count,
+                          job.threads, cell(curve.wall_seconds[k]), cell(curve.steal_seconds[k]));
     }
   write_whole_file(file, text);
 }
@@ -145,7 +156,8 @@ void write_curve(Hdf5Group group, const MeasuredCurve& curve) {
     std::vector<double> each;  // x by seed
     for (const double x : band.x)
       for (const Curve& one : seeds_of) each.push_back(value_at(one, std::clamp(x, one.x.front(), one.x.back())));
-    observable.write("each", each, static_cast<int>(seeds_of.size()), {kind.y_unit, kind.y_label + ", rows as x, a column for each seed"});
+    observable.write("each", each, static_cast<int>(seeds_of.size()),
+                     {kind.y_unit, kind.y_label + ", rows as x, a column for each seed"});
   }
 }
 
@@ -161,9 +173,12 @@ void write_run_table(const fs::path& folder, const StudyPlan& plan, const std::v
     const JobOutcome& outcome = outcomes[k];
     const bool good = outcome.state == JobState::done || outcome.state == JobState::kept;
     const bool failed = outcome.state == JobState::failed;
-    text += fmt::format("{},{},{},{},{},{}\n", cell(plan.jobs[k].name), good ? "done" : failed ? "failed" : "not run",
-                        good || failed ? std::to_string(outcome.exit_code) : "", plan.jobs[k].c.particles.count, plan.jobs[k].c.seed,
-                        cell(outcome.message));
+    text += fmt::format("{},{},{},{},{},{}\n", cell(plan.jobs[k].name),
+                        good     ? "done"
+                        : failed ? "failed"
+                                 : "not run",
+                        good || failed ? std::to_string(outcome.exit_code) : "", plan.jobs[k].c.particles.count,
+                        plan.jobs[k].c.seed, cell(outcome.message));
   }
   write_whole_file(folder / "runs.csv", text);
 }
@@ -197,13 +212,15 @@ void write_study_h5(const fs::path& folder, const StudyPlan& plan, const std::ve
       Hdf5Group group = root.create_group(part.plan->study->name == "study" ? "part" : part.plan->study->name);
       group.attribute("reference_radius", part.plan->reference_radius);
       Hdf5Group curves = group.create_group("curves");
-      for (const MeasuredCurve& curve : part.curves) write_curve(curves.create_group(group_name(curve.planned->label)), curve);
+      for (const MeasuredCurve& curve : part.curves)
+        write_curve(curves.create_group(group_name(curve.planned->label)), curve);
       Hdf5Group collapse = group.create_group("collapse");
       for (const CollapseRow& row : part.collapse) {
         const std::string name = group_name(part.curves[row.curve].planned->label);
         Hdf5Group of_curve = collapse.has(name) ? collapse.group(name) : collapse.create_group(name);
-        of_curve.write(row.observable, row.error.each, 1, {observable_kind(row.observable).y_unit,
-                       "RMS distance of each seed from the mean of \"" + part.curves[row.reference].planned->label + "\""});
+        of_curve.write(row.observable, row.error.each, 1,
+                       {observable_kind(row.observable).y_unit, "RMS distance of each seed from the mean of \"" +
+                                                                    part.curves[row.reference].planned->label + "\""});
       }
     }
   }

@@ -14,9 +14,11 @@ namespace platen {
 std::filesystem::path part_folder(const std::filesystem::path& folder, const StudyPlan& plan, const PlannedPart& part);
 
 // All members throw OutputError.
-void write_run_table(const std::filesystem::path& folder, const StudyPlan& plan, const std::vector<JobOutcome>& outcomes);
+void write_run_table(const std::filesystem::path& folder, const StudyPlan& plan,
+                     const std::vector<JobOutcome>& outcomes);
 void write_part_tables(const std::filesystem::path& folder, const StudyPlan& plan, const PartResults& part);
 void write_statements(const std::filesystem::path& folder, const std::vector<Statement>& statements);
-void write_study_h5(const std::filesystem::path& folder, const StudyPlan& plan, const std::vector<PartResults>& results);
+void write_study_h5(const std::filesystem::path& folder, const StudyPlan& plan,
+                    const std::vector<PartResults>& results);
 
 }  // namespace platen

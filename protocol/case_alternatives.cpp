@@ -1,0 +1,92 @@
+#include "protocol/case_alternatives.h"
+
+#include <array>
+
+#include "protocol/scaling.h"
+
+namespace platen {
+namespace {
+
+// The one radius of the case, or a problem.
+bool one_radius(TableReader& law, std::string_view key, const ParticleSpec& particles, double& R) {
+  R = particles.sizes.radius;
+  if (particles.sizes.kind == SizeDistribution::Kind::mono && R > 0.0) return true;
+  law.error(key,
+            "is given by material data, which needs particles.radius; allowed: a number, or spheres of one radius");
+  return false;
+}
+
+}  // namespace
+
+bool is_table(TableReader& table, std::string_view key) {
+  const CaseEntry* const entry = table.entry(key);
+  return entry != nullptr && entry->value.type == CaseValue::Type::table;
+}
+
+bool read_stiffness_alternative(TableReader& law, std::string_view key, const ParticleSpec& particles, double exponent,
+                                double& out) {
+  TableReader data = law.table(key);
+  double E = 0.0, nu = 0.0, V = 0.0, R = 0.0;
+  bool good = data.quantity("young_modulus", Quantity::stress, positive, Need::required, E);
+  const bool impact = data.has("impact_speed") || data.has("poisson_ratio");
+  if (impact) {
+    good &= data.quantity("impact_speed", Quantity::speed, positive, Need::required, V);
+    good &= data.number("poisson_ratio", Range{-1.0, 0.5, false, true}, Need::required, nu);
+  }
+  data.refuse_unknown("a stiffness by material data");
+  if (exponent != 1.0) {
+    law.error(key, "is given by material data, which needs exponent 1; allowed: a plain number in N/m^n");
+    return false;
+  }
+  if (!one_radius(law, key, particles, R) || !good) return false;
+  if (impact && !(particles.density > 0.0)) {
+    law.error(key,
+              "is given by an impact speed, which needs particles.density; allowed: leave impact_speed and "
+              "poisson_ratio out");
+    return false;
+  }
+  out = impact ? stiffness_of_impact(R, particles.density, E, nu, V) : stiffness_of_modulus(R, E);
+  return true;
+}
+
+bool read_f0_alternative(TableReader& law, std::string_view key, const ParticleSpec& particles, double& out) {
+  TableReader data = law.table(key);
+  const std::array sources{"surface_energy", "hamaker_constant", "tensile_strength"};
+  int given = 0;
+  for (const char* source : sources) given += data.has(source) ? 1 : 0;
+  double R = 0.0;
+  bool good = one_radius(law, key, particles, R);
+  if (given != 1) {
+    law.error(
+        key,
+        "says not where it comes from; allowed: exactly one of surface_energy, hamaker_constant, tensile_strength, "
+        "or a number");
+    good = false;
+  }
+  if (data.has("surface_energy")) {
+    // J/m2 is N/m.
+    double gamma = 0.0, flattening = 2.0;
+    std::size_t model = 0;
+    good &= data.quantity("surface_energy", Quantity::stiffness, positive, Need::required, gamma);
+    good &= data.word("model", {"dmt", "jkr", "plastic_jkr"}, Need::required, model);
+    if (data.has("flattening")) good &= data.number("flattening", Range{1.0, infinite}, Need::optional, flattening);
+    if (good)
+      out = f0_of_surface_energy(
+          R, gamma, std::array{AdhesionModel::dmt, AdhesionModel::jkr, AdhesionModel::plastic_jkr}[model], flattening);
+  } else if (data.has("hamaker_constant")) {
+    double A = 0.0, z0 = 0.0;
+    good &= data.number("hamaker_constant", positive, Need::required, A, "the Hamaker constant is a plain number in J");
+    good &= data.quantity("distance", Quantity::length, positive, Need::required, z0);
+    if (good) out = f0_of_hamaker(R, A, z0);
+  } else if (data.has("tensile_strength")) {
+    double sigma_t = 0.0, phi = 0.0, CN = 0.0;
+    good &= data.quantity("tensile_strength", Quantity::stress, positive, Need::required, sigma_t);
+    good &= data.number("solid_fraction", fraction, Need::required, phi);
+    good &= data.number("coordination_number", positive, Need::required, CN);
+    if (good) out = f0_of_tensile_strength(R, sigma_t, phi, CN);
+  }
+  data.refuse_unknown("f0 by material data");
+  return good;
+}
+
+}  // namespace platen
