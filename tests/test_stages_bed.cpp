@@ -136,7 +136,8 @@ TEST(Vibrate, TakesItsDurationAndDensifies) {
   ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
   EXPECT_EQ(run.stage("vibrate").last_step - run.stage("vibrate").first_step, 30000);
   EXPECT_EQ(run.stage("vibrate").end_reason, "duration 0.3 s over");
-  EXPECT_LT(run.stage("settle").last.measures.porosity, run.stage("fill").last.measures.porosity);
+  // By the mean height of the spheres: the porosity of so small a bed hangs on its highest sphere.
+  EXPECT_LT(run.stage("settle").last.measures.potential_energy, run.stage("fill").last.measures.potential_energy);
   EXPECT_GT(run.stage("vibrate").last.measures.ledger.plate_work, 0.0);
   // The first slab begins at the bottom plate.
   const auto z = ResultsFile(run.path() / "results.h5").doubles("/profiles/vibrate/z");

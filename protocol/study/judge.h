@@ -1,7 +1,6 @@
 // What the statements are made of: finding curves by their powers, numbers with their scatter, bands.
 #pragma once
 
-#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
