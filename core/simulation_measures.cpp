@@ -139,7 +139,8 @@ Measures Simulation::measure(bool stored_energies) {
       const double loss = 2.5 * h * (motion_.mu_r * (si[3] + sj[3]) + (si[7] + sj[7]));
       const double left = loss < turning ? (turning - loss) / turning : 0.0;
       part.kinetic.add(0.5 * m * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) + 0.2 * m * turning2 * left * left);
-      part.rolled.add(0.2 * m * turning2 * (1.0 - left * left));
+      const double before = p.ux[k] * u[0] + p.uy[k] * u[1] + p.uz[k] * u[2];  // u(n-1/2) . u
+      part.rolled.add(0.2 * m * (1.0 - left) * (before + left * turning2));
       part.potential.add(m * gravity_ * p.z[k]);
       part.weight.add(m * gravity_);
       part.highest = std::max(part.highest, p.z[k] + R);

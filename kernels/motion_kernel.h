@@ -37,14 +37,16 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
     v = add_scaled<I>(v, kick, acceleration);
 
     Vec3<I> u = {I::load(b.ux + k), I::load(b.uy + k), I::load(b.uz + k)};
+    const Vec3<I> u_before = u;
     const Real turn = (I::set(2.5) * inverse_m) * kick;
     u = add_scaled<I>(u, turn, Vec3<I>{f[4], f[5], f[6]});
     if constexpr (rolling) {
       const Real strength = I::set(c.mu_r) * f[3] + f[7];
       const Vec3<I> slowed = slowed_spin<I>(u, strength * turn);
       if constexpr (energy) {
-        // Rotational energy (1/2)(2/5) m |u|^2 that rolling friction took.
-        const Real lost = (I::set(0.2) * m) * (dot(u, u) - dot(slowed, slowed));
+        // Work of rolling friction: what it took off the spin, times the mean spin of the kick. The other torques do
+        // theirs over the same spin. At rest, where it holds a torque and nothing turns, it takes nothing.
+        const Real lost = (I::set(0.2) * m) * dot(u - slowed, u_before + slowed);
         const Real magic = I::set(c.energy.magic);
         rolled = rolled + ((lost + magic) - magic);
         strange = strange || I::any(I::negate(I::abs(lost) < I::set(c.energy.bound)));

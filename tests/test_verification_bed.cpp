@@ -249,7 +249,8 @@ TEST(VerificationBed, LimitOfTheStep) {
 
 TEST(VerificationBed, CohesiveBedStaysAtRest) {
   heading("A cohesive bed of 64 spheres at rest: f0 up to 300 times the weight, 100,000 steps");
-  Figure energy("kinetic / potential energy at the end", ""), pairs("contacts lost or won", "");
+  Figure energy("kinetic / potential energy at the end", ""), pairs("contacts lost or won", ""),
+      ledger("energy dissipated at rest / all of before", "");
   for (const double f0 : {-0.02, -0.4}) {
     scenes::BedOptions o;
     o.spacing = 2.0, o.speed = 0.1;
@@ -265,6 +266,7 @@ TEST(VerificationBed, CohesiveBedStaysAtRest) {
     const Measures after = sim.measure();
     const std::string at = text("f0 = %g N", f0);
     energy.check_below(at, after.kinetic_energy / after.potential_energy, 1e-9);
+    ledger.check_below(at, (after.ledger.dissipated() - before.ledger.dissipated()) / before.ledger.dissipated(), 1e-6);
     pairs.check_below(at, std::fabs(static_cast<double>(after.contacts - before.contacts)), 1.0);
   }
 }

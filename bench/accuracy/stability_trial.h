@@ -39,7 +39,7 @@ struct Trial {
 struct Verdict {
   std::string verdict, why;
   double gain = 0.0;       // largest (mechanical energy - start - work of plates)/turned over
-  double residual = 0.0;   // |energy residual|/turned over at the end
+  double residual = 0.0;   // energy residual/turned over at the end
   double deepest = 0.0;    // largest overlap over the smaller radius that was seen
   double dt = 0.0;         // last [s]
   std::int64_t steps = 0;
@@ -143,7 +143,7 @@ inline Verdict run_trial(const Trial& t) {
       const double gain = (mechanical(m) - mechanical0 - work) / turned_over;
       if (!std::isfinite(gain)) v.verdict = "silently wrong", v.why = "energy is not a number";
       v.gain = std::max(v.gain, gain);
-      v.residual = std::fabs(m.energy_residual - start.energy_residual) / turned_over;
+      v.residual = (m.energy_residual - start.energy_residual) / turned_over;
       const std::string hidden = undetected(*sim, v.deepest);
       if (!hidden.empty()) v.verdict = "silently wrong", v.why = hidden;
       // The watch of a run with a fixed step looks every 8192 steps; here as often in relation to the trial.
@@ -155,7 +155,7 @@ inline Verdict run_trial(const Trial& t) {
       if (!v.verdict.empty()) break;
     }
     if (v.verdict.empty() && v.gain > 0.05) v.verdict = "silently wrong", v.why = fmt::format("energy grew by {:.0f} %", 100.0 * v.gain);
-    if (v.verdict.empty() && v.residual > 0.2) v.verdict = "silently wrong", v.why = fmt::format("energy ledger open by {:.0f} %", 100.0 * v.residual);
+    if (v.verdict.empty() && std::fabs(v.residual) > 0.2) v.verdict = "silently wrong", v.why = fmt::format("energy ledger open by {:.0f} %", 100.0 * v.residual);
     if (v.verdict.empty()) v.verdict = "bounded";
   } catch (const std::exception& error) {
     v.verdict = "stopped";
