@@ -22,7 +22,7 @@ struct Inner {
 
 void install(Batch& batch, const Inner& inner, bool with_k_t) {
   batch.used = static_cast<std::int32_t>(inner.from.size());
-  batch.padded = (batch.used + padding - 1) / padding * padding;
+  batch.padded = (batch.used + pair_padding - 1) / pair_padding * pair_padding;
   const auto size = static_cast<std::size_t>(batch.padded);
   for (auto* column : {&batch.i, &batch.j, &batch.slot_j, &batch.from}) column->assign(size, 0);
   for (auto* column : {&batch.sp, &batch.tx, &batch.ty, &batch.tz}) column->assign(size, 0.0);

@@ -3,6 +3,7 @@
 
 #include "kernels/eepa.h"
 #include "kernels/rolling.h"
+#include "kernels/twice.h"
 
 namespace platen {
 
@@ -26,39 +27,117 @@ struct PairForces {
   typename I::Mask touching;
 };
 
-// Consecutive contacts share owners, and owners follow each other along the curve: eight contacts mostly have theirs
-// within eight places, which one load and one permutation per field bring.
-template <class I, SceneTraits scene>
-PLATEN_INLINE void fetch_owners(const PairBatch& b, std::int32_t k, typename I::Real (&x)[4], typename I::Real (&v)[4],
-                                typename I::Real (&u)[4]) {
-  if constexpr (I::picks && scene.equal_spheres) {
-    const std::int32_t base = b.i[k];
-    if (b.i[k + I::width - 1] - base < I::width && base + I::width <= b.end) {
-      const auto where = I::places(b.i + k, base);
-      x[0] = I::pick(b.x + base, where), x[1] = I::pick(b.y + base, where), x[2] = I::pick(b.z + base, where);
-      v[0] = I::pick(b.vx + base, where), v[1] = I::pick(b.vy + base, where), v[2] = I::pick(b.vz + base, where);
-      u[0] = I::pick(b.ux + base, where), u[1] = I::pick(b.uy + base, where), u[2] = I::pick(b.uz + base, where);
-      return;
+// What the phases hand on, for one chunk: small enough to stay in the first cache.
+//
+//   fetch  ->  delta n v_n v_t lever (R m w)  ->  law  ->  F T S  ->  output
+template <SceneTraits scene>
+struct Chunk {
+  static constexpr int sides = scene.equal_spheres ? 1 : 2;  // of unequal spheres, each has its own
+  using Column = double[chunk_size];
+  alignas(64) Column delta;
+  alignas(64) Column n[3];
+  alignas(64) Column v_n;
+  alignas(64) Column v_t[3];
+  alignas(64) Column lever[sides];
+  alignas(64) Column R[2], m[2], w[3];
+  alignas(64) Column F[3];
+  alignas(64) Column T[sides][3];
+  alignas(64) Column S[sides];
+
+  template <class I>
+  static PLATEN_INLINE void put(Column (&to)[3], int at, const Vec3<I>& a) {
+    I::store(to[0] + at, a.x), I::store(to[1] + at, a.y), I::store(to[2] + at, a.z);
+  }
+  template <class I>
+  static PLATEN_INLINE Vec3<I> take(const Column (&from)[3], int at) {
+    return {I::load(from[0] + at), I::load(from[1] + at), I::load(from[2] + at)};
+  }
+
+  template <class I>
+  PLATEN_INLINE void put_pairs(int at, const Pairs<I>& p) {
+    I::store(delta + at, p.delta), I::store(v_n + at, p.v_n), I::store(lever[0] + at, p.lever_i);
+    put<I>(n, at, p.n), put<I>(v_t, at, p.v_t);
+    if constexpr (!scene.equal_spheres) {
+      I::store(lever[1] + at, p.lever_j);
+      I::store(R[0] + at, p.R_i), I::store(R[1] + at, p.R_j), I::store(m[0] + at, p.m_i), I::store(m[1] + at, p.m_j);
+    }
+    if constexpr (scene.rolling == Rolling::relative) put<I>(w, at, p.w);
+  }
+  template <class I>
+  PLATEN_INLINE Pairs<I> take_pairs(int at) const {
+    Pairs<I> p;
+    p.delta = I::load(delta + at), p.v_n = I::load(v_n + at), p.lever_i = p.lever_j = I::load(lever[0] + at);
+    p.n = take<I>(n, at), p.v_t = take<I>(v_t, at);
+    if constexpr (!scene.equal_spheres) {
+      p.lever_j = I::load(lever[1] + at);
+      p.R_i = I::load(R[0] + at), p.R_j = I::load(R[1] + at), p.m_i = I::load(m[0] + at), p.m_j = I::load(m[1] + at);
+    }
+    if constexpr (scene.rolling == Rolling::relative) p.w = take<I>(w, at);
+    return p;
+  }
+  template <class I>
+  PLATEN_INLINE void put_forces(int at, const PairForces<I>& f) {
+    put<I>(F, at, f.F), put<I>(T[0], at, f.T_i);
+    if constexpr (!scene.equal_spheres) put<I>(T[1], at, f.T_j);
+    if constexpr (scene.rolling == Rolling::absolute) {
+      I::store(S[0] + at, f.S_i);
+      if constexpr (!scene.equal_spheres) I::store(S[1] + at, f.S_j);
     }
   }
-  I::fetch4(b.rows, b.i + k, 0, x);
-  I::fetch4(b.rows, b.i + k, 4, v);
-  I::fetch4(b.rows, b.i + k, 8, u);
+  // Fields of the records of one side, in their order.
+  template <class I>
+  PLATEN_INLINE void take_fields(int at, int side, typename I::Real (&fields)[8]) const {
+    for (int axis = 0; axis < 3; ++axis) fields[axis] = I::load(F[axis] + at), fields[4 + axis] = I::load(T[side][axis] + at);
+    fields[3] = scene.rolling == Rolling::absolute ? I::load(S[side] + at) : I::set(0.0);
+    fields[7] = I::set(0.0);
+  }
+};
+
+// The owner side. Consecutive contacts share owners, and owners follow each other along the curve: eight contacts mostly have theirs
+// within eight places, which one load and one permutation per field bring.
+template <class I>
+struct Fetched {
+  typename I::Real row[12];
+};
+template <class I>
+PLATEN_INLINE Fetched<I> fetch_rows(const double* rows, const std::int32_t* index) {
+  Fetched<I> f;
+  I::fetch_rows(rows, index, f.row);
+  return f;
+}
+template <class I, SceneTraits scene>
+PLATEN_INLINE Fetched<I> fetch_owners(const PairBatch& b, std::int32_t k) {
+  if constexpr (requires { typename I::Half; }) {
+    const auto first = fetch_owners<typename I::Half, scene>(b, k), second = fetch_owners<typename I::Half, scene>(b, k + I::half);
+    Fetched<I> f;
+    for (int m = 0; m < 12; ++m) f.row[m] = {first.row[m], second.row[m]};
+    return f;
+  } else {
+    if constexpr (I::picks && scene.equal_spheres) {
+      const std::int32_t base = b.i[k];
+      if (b.i[k + I::width - 1] - base < I::width && base + I::width <= b.end) {
+        const auto where = I::places(b.i + k, base);
+        const auto pick = [&](const double* column) { return I::pick(column + base, where); };
+        const auto none = I::set(0.0);
+        return {{pick(b.x), pick(b.y), pick(b.z), none, pick(b.vx), pick(b.vy), pick(b.vz), none, pick(b.ux), pick(b.uy),
+                 pick(b.uz), none}};
+      }
+    }
+    return fetch_rows<I>(b.rows, b.i + k);
+  }
 }
 
-template <class I, SceneTraits scene, bool exact>
+template <class I, SceneTraits scene, bool exact, bool periodic>
 PLATEN_INLINE Pairs<I> fetch_pairs(const PairBatch& b, const LawConstants& c, std::int32_t k) {
   using Real = typename I::Real;
-  Real xi[4], xj[4], vi[4], vj[4], ui[4], uj[4];
-  I::fetch4(b.rows, b.j + k, 0, xj);
-  I::fetch4(b.rows, b.j + k, 4, vj);
-  I::fetch4(b.rows, b.j + k, 8, uj);
-  fetch_owners<I, scene>(b, k, xi, vi, ui);
+  const Fetched<I> i = fetch_owners<I, scene>(b, k), j = fetch_rows<I>(b.rows, b.j + k);
   Pairs<I> p;
-  // Nearest image: an odd function that changes no bit of a pair inside the box, or when the lengths are 0.
-  Vec3<I> d = {xi[0] - xj[0], xi[1] - xj[1], xi[2] - xj[2]};
-  d.x = I::fma(I::set(-c.width), I::round(d.x * I::set(c.inverse_width)), d.x);
-  d.y = I::fma(I::set(-c.depth), I::round(d.y * I::set(c.inverse_depth)), d.y);
+  // Nearest image: an odd function that changes no bit of a pair inside the box.
+  Vec3<I> d = {i.row[0] - j.row[0], i.row[1] - j.row[1], i.row[2] - j.row[2]};
+  if constexpr (periodic) {
+    d.x = I::fnma(I::set(c.width), I::round(d.x * I::set(c.inverse_width)), d.x);
+    d.y = I::fnma(I::set(c.depth), I::round(d.y * I::set(c.inverse_depth)), d.y);
+  }
   const Real distance2 = dot(d, d);
   const Real inverse = inverse_sqrt<I, exact>(distance2);
   p.n = scale<I>(inverse, d);
@@ -67,9 +146,9 @@ PLATEN_INLINE Pairs<I> fetch_pairs(const PairBatch& b, const LawConstants& c, st
     reach = I::set(c.radius + c.radius);
     inverse_R_i = inverse_R_j = I::set(c.inverse_radius);
   } else {
-    p.R_i = xi[3], p.R_j = xj[3], p.m_i = vi[3], p.m_j = vj[3];
+    p.R_i = i.row[3], p.R_j = j.row[3], p.m_i = i.row[7], p.m_j = j.row[7];
     reach = p.R_i + p.R_j;
-    inverse_R_i = ui[3], inverse_R_j = uj[3];
+    inverse_R_i = i.row[11], inverse_R_j = j.row[11];
   }
   p.delta = reach - distance2 * inverse;
   const Real half = I::set(0.5) * p.delta;
@@ -78,20 +157,26 @@ PLATEN_INLINE Pairs<I> fetch_pairs(const PairBatch& b, const LawConstants& c, st
     p.lever_j = p.lever_i;
   else
     p.lever_j = I::set(1.0) - half * inverse_R_j;
-  const Vec3<I> v = {vi[0] - vj[0], vi[1] - vj[1], vi[2] - vj[2]};
+  const Vec3<I> v = {i.row[4] - j.row[4], i.row[5] - j.row[5], i.row[6] - j.row[6]};
   // Written per side in every scene, and symmetric in i and j to the last bit.
-  const Vec3<I> u_i = {ui[0], ui[1], ui[2]}, u_j = {uj[0], uj[1], uj[2]};
+  const Vec3<I> u_i = {i.row[8], i.row[9], i.row[10]}, u_j = {j.row[8], j.row[9], j.row[10]};
   const Vec3<I> spin = scale<I>(p.lever_i, u_i) + scale<I>(p.lever_j, u_j);
   p.v_n = dot(v, p.n);
-  p.v_t = add_scaled<I>(v, -p.v_n, p.n) + cross(p.n, spin);
+  p.v_t = sub_scaled<I>(v, p.v_n, p.n) + cross(p.n, spin);
   if constexpr (scene.rolling == Rolling::relative) p.w = scale<I>(inverse_R_i, u_i) - scale<I>(inverse_R_j, u_j);
   return p;
 }
 
-// Forces of `width` pairs; reads and advances their history, adds their energies.
+// What `width` pairs take out of the ledger in a step [J].
+template <class I>
+struct PairEnergies {
+  typename I::Real plastic, viscous, sliding, rolling, model;
+};
+
+// Forces of `width` pairs; reads and advances their history, finds their energies.
 template <class I, SceneTraits scene, bool exact>
 PLATEN_INLINE PairForces<I> pair_forces(const Pairs<I>& p, const PairBatch& b, const LawConstants& c, std::int32_t k,
-                                        typename I::Real (&energy)[term_count]) {
+                                        PairEnergies<I>& energy) {
   using Real = typename I::Real;
   const Real zero = I::set(0.0);
   PairForces<I> out;
@@ -120,7 +205,7 @@ PLATEN_INLINE PairForces<I> pair_forces(const Pairs<I>& p, const PairBatch& b, c
   const Vec3<I> T_old = {I::load(b.tx + k), I::load(b.ty + k), I::load(b.tz + k)};
   const Real limit = I::set(c.mu) * I::abs(normal.height);
   const TangentialResponse<I> tangential = tangential_response<I, exact>(T_old, p.n, p.v_t, k_t, limit, c.dt);
-  const Vec3<I> F_t = add_scaled<I>(tangential.spring, I::where(tangential.cut, zero, -beta_t), p.v_t);
+  const Vec3<I> F_t = sub_scaled<I>(tangential.spring, I::where(tangential.cut, zero, beta_t), p.v_t);
 
   const Vec3<I> none = {zero, zero, zero};
   const Vec3<I> T_new = where<I>(out.touching, tangential.spring, none);
@@ -130,9 +215,9 @@ PLATEN_INLINE PairForces<I> pair_forces(const Pairs<I>& p, const PairBatch& b, c
   // contributions
   // Masked last: padding has no distance, and what it computes is not a number.
   out.F = where<I>(out.touching, add_scaled<I>(F_t, f_n, p.n), none);
-  const Vec3<I> turn = cross(p.n, F_t);
-  out.T_i = where<I>(out.touching, scale<I>(-p.lever_i, turn), none);
-  if constexpr (!scene.equal_spheres) out.T_j = where<I>(out.touching, scale<I>(-p.lever_j, turn), none);
+  const Vec3<I> turn = minus_cross(p.n, F_t);
+  out.T_i = where<I>(out.touching, scale<I>(p.lever_i, turn), none);
+  if constexpr (!scene.equal_spheres) out.T_j = where<I>(out.touching, scale<I>(p.lever_j, turn), none);
   const Real strength = I::abs(normal.f_hys);
   out.S_i = out.S_j = zero;
   if constexpr (scene.rolling == Rolling::absolute) {
@@ -147,7 +232,7 @@ PLATEN_INLINE PairForces<I> pair_forces(const Pairs<I>& p, const PairBatch& b, c
     const Vec3<I> M = where<I>(out.touching, torque, none);
     out.T_i = add_scaled<I>(out.T_i, I::set(1.0) / p.R_i, M);
     out.T_j = add_scaled<I>(out.T_j, -(I::set(1.0) / p.R_j), M);
-    if constexpr (scene.energy) energy[term_rolling] = zero - dot(M, p.w) * I::set(c.dt);
+    if constexpr (scene.energy) energy.rolling = zero - dot(M, p.w) * I::set(c.dt);
   }
 
   if constexpr (scene.energy) {
@@ -160,20 +245,20 @@ PLATEN_INLINE PairForces<I> pair_forces(const Pairs<I>& p, const PairBatch& b, c
     const Real normal_share = I::where(out.touching, now, zero) + I::where(was_touching, before, zero);
     const Real tangential_share = I::where(sticking, normal_share, zero);
     const Real viscous = (beta_n * normal_share) * (p.v_n * p.v_n) + (beta_t * tangential_share) * dot(p.v_t, p.v_t);
-    energy[term_viscous] = I::where(I::either(out.touching, was_touching), viscous, zero);
+    energy.viscous = I::where(I::either(out.touching, was_touching), viscous, zero);
     if constexpr (scene.plasticity)
-      energy[term_plastic] = plastic_dissipation<I, scene.exponent>(sp_old, normal.sp, c);
+      energy.plastic = plastic_dissipation<I, scene.exponent>(sp_old, normal.sp, c);
     if constexpr (scene.exponent == Exponent::one) {
       const Real slid = I::where(out.touching, tangential.loss, old2);
-      energy[term_sliding] = slid * I::set(c.half_over_k_t);
+      energy.sliding = slid * I::set(c.half_over_k_t);
     } else {
       // The spring's energy |T|^2/(2 k_t) also changes with k_t(delta): that part is no work of any force [A17].
       const Real k_t_last = I::load(b.k_t_last + k), half = I::set(0.5);
       const Real flexible_last = I::where(k_t_last > zero, half / k_t_last, zero);
       const Real flexible = I::where(out.touching, half / k_t, zero);
-      energy[term_sliding] =
+      energy.sliding =
           I::where(out.touching, tangential.loss * flexible, old2 * flexible_last);
-      energy[term_model] = I::where(out.touching, old2 * (flexible - flexible_last), zero);
+      energy.model = I::where(out.touching, old2 * (flexible - flexible_last), zero);
       I::store(b.k_t_last + k, I::where(out.touching, k_t, zero));
     }
   }
@@ -189,82 +274,99 @@ PLATEN_INLINE typename I::Real rounded(typename I::Real x, const Quantum& q) {
 // Rounds the contributions, turns them into records and adds them up: the owner's by a sum carried from contact to
 // contact (consecutive contacts share owners), the partner's into its slot.
 template <class I, SceneTraits scene>
-PLATEN_INLINE void output_pairs(const PairForces<I>& f, const PairBatch& b, const LawConstants& c, std::int32_t k,
-                                typename I::Record& carried, std::int32_t& owner) {
-  using Real = typename I::Real;
-  const Real zero = I::set(0.0);
-  const auto pack = [&](const Vec3<I>& T, Real S, typename I::Record(&records)[I::width]) {
-    const Real fields[8] = {rounded<I>(f.F.x, c.force), rounded<I>(f.F.y, c.force), rounded<I>(f.F.z, c.force),
-                            rounded<I>(S, c.force),     rounded<I>(T.x, c.force),   rounded<I>(T.y, c.force),
-                            rounded<I>(T.z, c.force),   zero};
-    I::to_records(fields, records);
-  };
-  typename I::Record on_i[I::width];
-  pack(f.T_i, f.S_i, on_i);
-  typename I::Record on_j[I::width];
-  if constexpr (!scene.equal_spheres) pack(f.T_j, f.S_j, on_j);
+PLATEN_INLINE void output_pairs(const Chunk<scene>& chunk, int at, const PairBatch& b, const LawConstants& c,
+                                std::int32_t k, typename I::Record& carried, std::int32_t& owner) {
+  typename I::Record records[Chunk<scene>::sides][I::width];
+  for (int side = 0; side < Chunk<scene>::sides; ++side) {
+    typename I::Real fields[8];
+    chunk.template take_fields<I>(at, side, fields);
+    for (int field = 0; field < 7; ++field) fields[field] = rounded<I>(fields[field], c.force);
+    I::to_records(fields, records[side]);
+  }
   for (int lane = 0; lane < I::width; ++lane) {
     const std::int32_t i = b.i[k + lane];
-    carried = I::add(I::keep(i == owner, carried), on_i[lane]);
+    carried = I::add_if(i == owner, records[0][lane], carried);
     owner = i;
     I::store_record(b.sum_i + record_size * static_cast<std::int64_t>(i - b.first), carried);
     double* slot = b.sum_j + record_size * static_cast<std::int64_t>(b.slot_j[k + lane]);
-    I::store_record(slot, I::add(I::load_record(slot), I::react(scene.equal_spheres ? on_i[lane] : on_j[lane])));
+    I::store_record(slot, I::add_reaction(I::load_record(slot), records[Chunk<scene>::sides - 1][lane]));
   }
 }
 
-// Which energy terms pairs of a scene have at all.
-constexpr bool has_term(const SceneTraits& scene, int term) {
-  switch (term) {
-    case term_plastic: return scene.plasticity;
-    case term_rolling: return scene.rolling == Rolling::relative;  // absolute: in the motion kernel
-    case term_model: return scene.exponent != Exponent::one;
-    default: return true;
-  }
+// Calls visit(term, value) for each energy that pairs of a scene have at all.
+template <class I, SceneTraits scene, class Visit>
+PLATEN_INLINE void for_each_energy(const PairEnergies<I>& energy, const Visit& visit) {
+  visit(term_viscous, energy.viscous);
+  visit(term_sliding, energy.sliding);
+  if constexpr (scene.plasticity) visit(term_plastic, energy.plastic);
+  if constexpr (scene.rolling == Rolling::relative) visit(term_rolling, energy.rolling);  // absolute: motion kernel
+  if constexpr (scene.exponent != Exponent::one) visit(term_model, energy.model);
 }
 
+// Law of a chunk; whether every contribution is a number within its bound.
 template <class I, SceneTraits scene, bool exact>
-void contact_kernel(const PairBatch& b, const LawConstants& c, PairTotals& totals) noexcept {
+PLATEN_INLINE bool law_of_chunk(Chunk<scene>& chunk, const PairBatch& b, const LawConstants& c, std::int32_t start,
+                                int count, PairTotals& totals) {
   using Real = typename I::Real;
+  const Real zero = I::set(0.0);
+  const Real force_bound2 = I::set(c.force.bound * c.force.bound), energy_bound = I::set(c.energy.bound);
+  PairEnergies<I> sums = {zero, zero, zero, zero, zero};
+  auto wrong = zero > zero;
+  int contacts = 0;
+  for (int at = 0; at < count; at += I::width) {
+    const Pairs<I> pairs = chunk.template take_pairs<I>(at);
+    PairEnergies<I> energy;
+    const PairForces<I> forces = pair_forces<I, scene, exact>(pairs, b, c, start + at, energy);
+    chunk.template put_forces<I>(at, forces);
+    contacts += I::count(forces.touching);
+    // Written so that a NaN counts as out of range.
+    auto fine = I::fma(forces.S_i, forces.S_i, dot(forces.F, forces.F)) < force_bound2;
+    // An overlap above R, the centre of one sphere deep inside the other, is no contact any more: a lever below R/2.
+    const auto deep = I::both(forces.touching, I::either(pairs.lever_i < I::set(0.5), pairs.lever_j < I::set(0.5)));
+    wrong = I::either(wrong, deep);
+    if constexpr (scene.energy) {
+      Real size = zero;
+      for_each_energy<I, scene>(energy, [&](int, const Real& value) { size = size + I::abs(value); });
+      fine = I::both(fine, size < energy_bound);
+      sums.viscous = sums.viscous + rounded<I>(energy.viscous, c.energy);
+      sums.sliding = sums.sliding + rounded<I>(energy.sliding, c.energy);
+      if constexpr (scene.plasticity) sums.plastic = sums.plastic + rounded<I>(energy.plastic, c.energy);
+      if constexpr (scene.rolling == Rolling::relative) sums.rolling = sums.rolling + rounded<I>(energy.rolling, c.energy);
+      if constexpr (scene.exponent != Exponent::one) sums.model = sums.model + rounded<I>(energy.model, c.energy);
+    }
+    wrong = I::either(wrong, I::negate(fine));
+  }
+  if constexpr (scene.energy)
+    for_each_energy<I, scene>(sums, [&](int term, const Real& sum) {
+      totals.energy[term] += static_cast<std::int64_t>(I::sum(sum) * c.energy.inverse);
+    });
+  totals.contacts += contacts;
+  return !I::any(wrong);
+}
+
+// Three loops over each chunk instead of one with everything in it: a processor looks a few hundred instructions ahead,
+// so only short bodies let the next contacts begin while the last ones wait for their results.
+template <class I, SceneTraits scene, bool exact>
+void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairTotals& totals) noexcept {
+  const PairBatch b = batch;  // copies, which no store through a pointer can change
+  const LawConstants c = constants;
   typename I::Record carried = I::zero_record();
   std::int32_t owner = -1;
-  std::int64_t contacts = 0;
-  bool out_of_range = false;
-  const Real force_bound2 = I::set(c.force.bound * c.force.bound), energy_bound = I::set(c.energy.bound);
+  bool fine = true;
+  Chunk<scene> chunk;
   for (std::int32_t start = 0; start < b.count; start += chunk_size) {
-    const std::int32_t end = start + chunk_size < b.count ? start + chunk_size : b.count;
-    Real sums[term_count];
-    for (Real& sum : sums) sum = I::set(0.0);
-    for (std::int32_t k = start; k < end; k += I::width) {
-      const Pairs<I> pairs = fetch_pairs<I, scene, exact>(b, c, k);
-      Real energy[term_count];
-      for (Real& term : energy) term = I::set(0.0);
-      const PairForces<I> forces = pair_forces<I, scene, exact>(pairs, b, c, k, energy);
-      output_pairs<I, scene>(forces, b, c, k, carried, owner);
-      contacts += I::count(forces.touching);
-      // Written so that a NaN counts as out of range.
-      const Real size2 = I::max(dot(forces.F, forces.F), forces.S_i * forces.S_i);
-      auto fine = I::both(size2 < force_bound2, dot(forces.F, forces.F) < force_bound2);
-      // An overlap above R, the centre of one sphere deep inside the other, is no contact any more: a lever below R/2.
-      const auto shallow = I::both(pairs.lever_i >= I::set(0.5), pairs.lever_j >= I::set(0.5));
-      fine = I::both(fine, I::either(I::negate(forces.touching), shallow));
-      if constexpr (scene.energy) {
-        Real largest = I::set(0.0);
-        for (int term = 0; term < term_count; ++term)
-          if (has_term(scene, term)) {
-            largest = largest + I::abs(energy[term]);
-            sums[term] = sums[term] + rounded<I>(energy[term], c.energy);
-          }
-        fine = I::both(fine, largest < energy_bound);
-      }
-      out_of_range = out_of_range || I::any(I::negate(fine));
-    }
-    if constexpr (scene.energy)
-      for (int term = 0; term < term_count; ++term)
-        if (has_term(scene, term)) totals.energy[term] += static_cast<std::int64_t>(I::sum(sums[term]) * c.energy.inverse);
+    const int count = start + chunk_size < b.count ? chunk_size : b.count - start;
+    if (c.width > 0.0)
+      for (int at = 0; at < count; at += I::width)
+        chunk.template put_pairs<I>(at, fetch_pairs<I, scene, exact, true>(b, c, start + at));
+    else
+      for (int at = 0; at < count; at += I::width)
+        chunk.template put_pairs<I>(at, fetch_pairs<I, scene, exact, false>(b, c, start + at));
+    fine = law_of_chunk<typename Interleaved<I>::Type, scene, exact>(chunk, b, c, start, count, totals) && fine;
+    for (int at = 0; at < count; at += I::width)
+      output_pairs<I, scene>(chunk, at, b, c, start + at, carried, owner);
   }
-  totals.contacts += contacts;
-  totals.out_of_range = totals.out_of_range || out_of_range;
+  totals.out_of_range = totals.out_of_range || !fine;
 }
 
 }  // namespace platen

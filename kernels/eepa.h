@@ -83,13 +83,13 @@ template <class I, bool exact>
 PLATEN_INLINE TangentialResponse<I> tangential_response(const Vec3<I>& T_old, const Vec3<I>& n, const Vec3<I>& v_t,
                                                         typename I::Real k_t, typename I::Real limit, double dt) {
   using Real = typename I::Real;
-  const Vec3<I> flat = add_scaled<I>(T_old, -dot(T_old, n), n);
+  const Vec3<I> flat = sub_scaled<I>(T_old, dot(T_old, n), n);
   const Real length2 = dot(T_old, T_old), product = length2 * dot(flat, flat);
   // length/|flat| = length2 / sqrt(length2 |flat|^2); springs too small to square are left as they are.
   const Real tiny = I::set(0x1p-900);
   const Real stretch =
       I::where(product > tiny, length2 * inverse_sqrt<I, exact>(I::max(product, tiny)), I::set(1.0));
-  const Vec3<I> trial = add_scaled<I>(scale<I>(stretch, flat), -(k_t * I::set(dt)), v_t);
+  const Vec3<I> trial = sub_scaled<I>(scale<I>(stretch, flat), k_t * I::set(dt), v_t);
   const Real trial2 = dot(trial, trial), limit2 = limit * limit;
   const auto cut = trial2 >= limit2;  // also where both are 0: no dashpot on a frictionless contact
   const Real back = I::where(cut, limit * inverse_sqrt<I, exact>(I::max(trial2, tiny)), I::set(1.0));

@@ -23,10 +23,9 @@ void plate_kernel(const PlateBatch& b, const Plane& plane, const PlateConstants&
   };
 
   for (std::int32_t k = 0; k < b.count; k += I::width) {
-    Real x[4], v[4], u[4];
-    I::fetch4(b.rows, b.particle + k, 0, x);
-    I::fetch4(b.rows, b.particle + k, 4, v);
-    I::fetch4(b.rows, b.particle + k, 8, u);
+    Real row[12];
+    I::fetch_rows(b.rows, b.particle + k, row);
+    const Real *x = row, *v = row + 4, *u = row + 8;
     const Real R = x[3], m = v[3], inverse_R = u[3];
     const Real distance = sign * (x[plane.axis] - I::set(plane.position));
     const auto touching = I::both(R - distance > zero, lanes + I::set(k) < I::set(b.used));

@@ -27,6 +27,11 @@ template <class I>
 PLATEN_INLINE Vec3<I> add_scaled(const Vec3<I>& a, typename I::Real s, const Vec3<I>& b) {
   return {I::fma(s, b.x, a.x), I::fma(s, b.y, a.y), I::fma(s, b.z, a.z)};
 }
+// a - s b
+template <class I>
+PLATEN_INLINE Vec3<I> sub_scaled(const Vec3<I>& a, typename I::Real s, const Vec3<I>& b) {
+  return {I::fnma(s, b.x, a.x), I::fnma(s, b.y, a.y), I::fnma(s, b.z, a.z)};
+}
 template <class I>
 PLATEN_INLINE typename I::Real dot(const Vec3<I>& a, const Vec3<I>& b) {
   return I::fma(a.x, b.x, I::fma(a.y, b.y, a.z * b.z));
@@ -34,7 +39,12 @@ PLATEN_INLINE typename I::Real dot(const Vec3<I>& a, const Vec3<I>& b) {
 // Odd in each argument to the last bit: what a pair needs so that it may be stored either way round.
 template <class I>
 PLATEN_INLINE Vec3<I> cross(const Vec3<I>& a, const Vec3<I>& b) {
-  return {I::fma(a.y, b.z, -(a.z * b.y)), I::fma(a.z, b.x, -(a.x * b.z)), I::fma(a.x, b.y, -(a.y * b.x))};
+  return {I::fms(a.y, b.z, a.z * b.y), I::fms(a.z, b.x, a.x * b.z), I::fms(a.x, b.y, a.y * b.x)};
+}
+// -(a x b), to the last bit
+template <class I>
+PLATEN_INLINE Vec3<I> minus_cross(const Vec3<I>& a, const Vec3<I>& b) {
+  return {I::fnma(a.y, b.z, a.z * b.y), I::fnma(a.z, b.x, a.x * b.z), I::fnma(a.x, b.y, a.y * b.x)};
 }
 template <class I>
 PLATEN_INLINE Vec3<I> where(typename I::Mask m, const Vec3<I>& a, const Vec3<I>& b) {

@@ -20,7 +20,8 @@ namespace platen {
 inline constexpr int row_size = 12;    // doubles of a particle's row
 inline constexpr int record_size = 8;  // doubles of a record
 inline constexpr int chunk_size = 64;  // contacts between two conversions of energies to integers
-inline constexpr int padding = 8;      // rows of contacts are padded to a multiple of the widest vector
+inline constexpr int padding = 8;        // particles are padded to a multiple of the widest vector
+inline constexpr int pair_padding = 16;  // contacts to what a kernel takes at once: two such vectors
 
 // x rounded to a multiple of q: (x + magic) - magic with magic = 1.5 * 2^52 * q. Sums of such numbers are exact as long
 // as they stay below 2^53 q, hence the same in any order.
@@ -57,7 +58,7 @@ struct LawConstants {
   double dt;                 // last drift; 0 when forces are evaluated without advancing springs
 };
 
-// The contacts that a batch owns. Sorted by i, then j; `count` is a multiple of `padding`, padded with i = j.
+// The contacts that a batch owns. Sorted by i, then j; `count` is a multiple of `pair_padding`, padded with i = j.
 //
 //   contact:      0     1     2     3     4   ...
 //   i             17    17    17    18    20  ...   owner side: particle of this batch

@@ -83,6 +83,8 @@ class RealChecks {
         // xsimd's minus sign on AVX-512 is 0 - x: a zero may come out with either sign, which nothing depends on.
         each("negation", -a + I::set(0.0), [&](int l) { return -A(l) + 0.0; });
         each("fma", I::fma(a, b, c), [&](int l) { return std::fma(A(l), B(l), C(l)); });
+        each("fms", I::fms(a, b, c), [&](int l) { return std::fma(A(l), B(l), -C(l)); });
+        each("fnma", I::fnma(a, b, c), [&](int l) { return std::fma(-A(l), B(l), C(l)); });
         each("min", I::min(a, b), [&](int l) { return A(l) < B(l) ? A(l) : B(l); });
         each("max", I::max(a, b), [&](int l) { return A(l) > B(l) ? A(l) : B(l); });
         each("where <", I::where(a < b, a, c), [&](int l) { return A(l) < B(l) ? A(l) : C(l); });
@@ -153,22 +155,24 @@ class RealChecks {
     constexpr int rows = 19;
     alignas(64) double row[12 * rows];
     for (int k = 0; k < 12 * rows; ++k) row[k] = 1000.0 + k;
-    for (int start = 0; start < rows; ++start)
-      for (const int first : {0, 4, 8}) {
-        std::int32_t index[W];
-        for (int lane = 0; lane < W; ++lane) index[lane] = (start + 7 * lane * lane) % rows;
-        Real fields[4];
-        I::fetch4(row, index, first, fields);
-        for (int k = 0; k < 4; ++k)
-          each("fetch4", fields[k], [&](int lane) { return 1000.0 + 12 * index[lane] + first + k; });
+    for (int start = 0; start < rows; ++start) {
+      std::int32_t index[W];
+      for (int lane = 0; lane < W; ++lane) index[lane] = (start + 7 * lane * lane) % rows;
+      Real fields[12];
+      I::fetch_rows(row, index, fields);
+      for (int k = 0; k < 12; ++k)
+        each("fetch_rows", fields[k], [&](int lane) { return 1000.0 + 12 * index[lane] + k; });
 
+      for (const int first : {0, 4, 8}) {
         alignas(64) double out[12 * W];
         for (double& x : out) x = -1.0;
-        I::scatter4(out, first, fields);
+        const Real part[4] = {fields[first], fields[first + 1], fields[first + 2], fields[first + 3]};
+        I::scatter4(out, first, part);
         for (int lane = 0; lane < W; ++lane)
           for (int k = 0; k < 12; ++k)
             same("scatter4", out[12 * lane + k], k >= first && k < first + 4 ? 1000.0 + 12 * index[lane] + k : -1.0);
       }
+    }
 
     Real fields[8], back[8];
     for (int k = 0; k < 8; ++k) {
@@ -186,18 +190,21 @@ class RealChecks {
       for (int k = 0; k < 8; ++k) same("to_records", a[k], 10.0 * lane + k + 0.5);
       I::store_record(b, I::add(records[lane], I::load_record(a)));
       for (int k = 0; k < 8; ++k) same("add", b[k], a[k] + a[k]);
-      I::store_record(b, I::keep(true, records[lane]));
-      for (int k = 0; k < 8; ++k) same("keep", b[k], a[k]);
-      I::store_record(b, I::keep(false, records[lane]));
-      for (int k = 0; k < 8; ++k) same("keep not", b[k], 0.0);
-      I::store_record(b, I::react(records[lane]));
-      for (int k = 0; k < 8; ++k) same("react", b[k], k < 3 ? -a[k] : a[k]);
+      I::store_record(b, I::add_if(true, records[lane], I::load_record(a)));
+      for (int k = 0; k < 8; ++k) same("add_if", b[k], a[k] + a[k]);
+      I::store_record(b, I::add_if(false, records[lane], I::load_record(a)));
+      for (int k = 0; k < 8; ++k) same("add_if not", b[k], a[k]);
+      I::store_record(b, I::add_reaction(I::load_record(a), records[W - 1 - lane]));
+      for (int k = 0; k < 8; ++k) {
+        const double other = 10.0 * (W - 1 - lane) + k + 0.5;
+        same("add_reaction", b[k], k < 3 ? a[k] - other : a[k] + other);
+      }
     }
     I::store_record(b, I::zero_record());
     for (int k = 0; k < 8; ++k) same("zero_record", b[k], 0.0);
     for (double& x : a) x = std::numeric_limits<double>::quiet_NaN();
-    I::store_record(b, I::keep(false, I::load_record(a)));  // what is dropped may be anything
-    for (int k = 0; k < 8; ++k) same("keep no NaN", b[k], 0.0);
+    I::store_record(b, I::add_if(false, records[0], I::load_record(a)));  // what is left out may be anything
+    for (int k = 0; k < 8; ++k) same("add_if no NaN", b[k], k + 0.5);
   }
 
  public:
