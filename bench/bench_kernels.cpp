@@ -88,7 +88,7 @@ void contacts(benchmark::State& state, InstructionSet set, const BenchScene& sce
   for (auto _ : state) {
     touching = 0;
     for (BatchCopy& b : l.batches) {
-      std::memset(b.sum_j.data(), 0, b.sum_j.size() * sizeof(double));  // part of a pass: core does it too
+      std::memset(b.sum.data(), 0, b.sum.size() * sizeof(double));  // part of a pass: core does it too
       totals.contacts = 0;
       l.sim->kernels().contacts(b.pairs(l.state), law, totals);
       touching += totals.contacts;
@@ -112,8 +112,8 @@ void motion(benchmark::State& state, InstructionSet set, const BenchScene& scene
     benchmark::ClobberMemory();
   }
   if (totals.out_of_range) state.SkipWithError("velocities out of range");
-  // Reads two records and nine columns, writes nine columns and a row.
-  const double bytes_each = 8.0 * (2 * record_size + 2 * 9 + row_size);
+  // Reads a record and ten columns, writes nine columns and a row.
+  const double bytes_each = 8.0 * (record_size + 10 + 9 + row_size);
   finish(state, static_cast<double>(l.particles), bytes_each * static_cast<double>(l.particles), "particle");
 }
 

@@ -35,8 +35,8 @@ BatchCopy::BatchCopy(const Batch& b)
       ty(copy_of(b.ty)),
       tz(copy_of(b.tz)),
       k_t_last(copy_of(b.k_t_last)),
-      sum_i(copy_of(b.sum_i)),
-      sum_j(copy_of(b.sum_j)),
+      sum(copy_of(b.sum)),
+      inverse_room2(static_cast<std::size_t>(b.count), 0.0),
       first(b.first),
       count(b.count),
       used(b.used),
@@ -62,7 +62,7 @@ PairBatch BatchCopy::pairs(const StateCopy& state) {
   b.i = i.data(), b.j = j.data(), b.slot_j = slot_j.data();
   b.sp = sp.data(), b.tx = tx.data(), b.ty = ty.data(), b.tz = tz.data();
   b.k_t_last = k_t_last.empty() ? nullptr : k_t_last.data();
-  b.sum_i = sum_i.data(), b.sum_j = sum_j.data();
+  b.sum = sum.data();
   b.first = first, b.count = padded, b.end = first + count;
   b.x = state.x.data(), b.y = state.y.data(), b.z = state.z.data();
   b.vx = state.vx.data(), b.vy = state.vy.data(), b.vz = state.vz.data();
@@ -88,8 +88,8 @@ MotionBatch BatchCopy::motion(StateCopy& s) {
           column(s.inverse_radius),
           s.rows.data() + row_size * at,
           s.image.data() + 2 * at,
-          sum_i.data(),
-          sum_j.data(),
+          sum.data(),
+          inverse_room2.data(),
           count};
 }
 
@@ -108,7 +108,7 @@ std::int64_t BatchCopy::row_bytes() const {
 }
 
 std::int64_t BatchCopy::sum_bytes() const {
-  return static_cast<std::int64_t>((sum_i.size() + 2 * sum_j.size()) * sizeof(double));  // sum_j is read and written
+  return static_cast<std::int64_t>(2 * sum.size() * sizeof(double));  // read and written
 }
 
 std::vector<BatchCopy> copies_of(const Simulation& sim) {

@@ -33,7 +33,8 @@ struct PlateCopy {
 struct BatchCopy {
   explicit BatchCopy(const Batch& b);
   AlignedArray<std::int32_t> i, j, slot_j;
-  AlignedArray<double> sp, tx, ty, tz, k_t_last, sum_i, sum_j;
+  AlignedArray<double> sp, tx, ty, tz, k_t_last, sum;
+  std::vector<double> inverse_room2;  // none: nothing is watched
   std::int32_t first = 0, count = 0, used = 0, padded = 0;
   std::vector<Incoming> incoming;
   std::vector<PlateCopy> plates;  // those with spheres near them

@@ -26,8 +26,8 @@ ParallelForStep::ParallelForStep(const Simulation& sim, const PairLaw& law, doub
 void ParallelForStep::merge(BatchCopy& b) {
   for (const Incoming& in : b.incoming) {
     const double* from =
-        batches_[static_cast<std::size_t>(in.batch)].sum_j.data() + record_size * static_cast<std::size_t>(in.slot);
-    double* to = b.sum_j.data() + record_size * static_cast<std::size_t>(in.local);
+        batches_[static_cast<std::size_t>(in.batch)].sum.data() + record_size * static_cast<std::size_t>(in.slot);
+    double* to = b.sum.data() + record_size * static_cast<std::size_t>(in.local);
     for (int k = 0; k < record_size; ++k) to[k] += from[k];
   }
   for (const PlateCopy& list : b.plates)
@@ -35,10 +35,7 @@ void ParallelForStep::merge(BatchCopy& b) {
       if (!(list.overlap[m] > 0.0)) continue;
       const auto at = record_size * static_cast<std::size_t>(list.particle[m] - b.first);
       const double* record = list.records.data() + record_size * m;
-      for (std::size_t k = 0; k < record_size; ++k) {
-        b.sum_j[at + k] = (b.sum_i[at + k] + b.sum_j[at + k]) + record[k];
-        b.sum_i[at + k] = 0.0;
-      }
+      for (std::size_t k = 0; k < record_size; ++k) b.sum[at + k] += record[k];
     }
 }
 
@@ -58,7 +55,7 @@ void ParallelForStep::advance(int steps) {
       tbb::parallel_for(0, count, [&](int k) {
         const FloatMode mode;
         BatchCopy& b = batches_[static_cast<std::size_t>(k)];
-        std::memset(b.sum_j.data(), 0, b.sum_j.size() * sizeof(double));
+        std::memset(b.sum.data(), 0, b.sum.size() * sizeof(double));
         PairTotals& totals = totals_[static_cast<std::size_t>(k)];
         totals.contacts = 0;
         kernels_.contacts(b.pairs(state_), law_, totals);

@@ -105,6 +105,11 @@ void one_block(const StepOptions& o, bool rain) {
                          {"seconds", seconds},
                          {"Z", now.coordination_number},
                          {"rebuilds", sim->counters().rebuilds},
+                         {"prunes", sim->counters().prunes},
+                         {"redone", sim->counters().redone_steps},
+                         {"total_steps", sim->step()},
+                         {"gap", sim->counters().gap / sim->largest_radius()},
+                         {"skin", sim->counters().skin / sim->largest_radius()},
                          {"hash", fmt::format("{:016x}", sim->state_hash())}};
   fmt::print("{}\n", line.dump());
 }

@@ -1,8 +1,8 @@
 // A batch: a contiguous range of particles along the Morton curve, and the contacts that it owns.
 //
 //   particles   ... | first ............ first+count | ...      whole vectors
-//   outer list  pairs of own particles within R_i + R_j + skin, by owner, then partner; lives from rebuild to rebuild
-//   inner list  those of them within R_i + R_j + gap, with the history; all that the contact kernel sees
+//   outer list  pairs of own particles within R_i + R_j + margins, by owner; lives from rebuild to rebuild
+//   inner list  those of them within smaller margins, with the history; all that the contact kernel sees
 //   sums        [ own particles | halo slots ]           halo slot: one per foreign partner, written by this batch only,
 //                                                         read by the partner's batch through `incoming`
 //
@@ -28,7 +28,7 @@ struct PlateList {
 // A record of another batch that belongs to one of our particles.
 struct Incoming {
   std::int32_t batch;
-  std::int32_t slot;   // record in that batch's sum_j
+  std::int32_t slot;   // record in that batch's sum
   std::int32_t local;  // our particle, from `first`
 };
 
@@ -42,7 +42,7 @@ struct Batch {
   AlignedArray<std::int32_t> i, j, slot_j, from;  // from: place in the outer list
   AlignedArray<double> sp, tx, ty, tz, k_t_last;
 
-  AlignedArray<double> sum_i, sum_j;
+  AlignedArray<double> sum;           // records
   std::vector<std::int32_t> halo;     // particle of each halo slot
   std::vector<Incoming> incoming;
   std::vector<int> partners;          // batches whose particles our outer pairs touch
@@ -55,8 +55,7 @@ struct Batch {
   std::int64_t plate_energy[term_count] = {};
   std::int64_t plate_work = 0;
   std::int64_t rolling = 0;
-  double path = 0.0;                  // sum over steps of the largest speed times dt [m]
-  double largest_speed = 0.0;         // of the last step [m/s]
+  double largest_pace = 0.0;          // largest speed^2 over room^2 of a run of steps [1/s2]
   bool out_of_range = false;
 };
 

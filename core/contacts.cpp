@@ -14,50 +14,72 @@ bool has_history(const Batch& b, std::size_t k) {
   return b.sp[k] != 0.0 || b.tx[k] != 0.0 || b.ty[k] != 0.0 || b.tz[k] != 0.0 || (!b.k_t_last.empty() && b.k_t_last[k] != 0.0);
 }
 
-// New inner list of one batch in the making.
+// New inner list of one batch in the making; the same memory for every batch that a thread works on.
 struct Inner {
-  std::vector<std::int32_t> from;
-  std::vector<PairHistory> history;  // signed from owner to partner here
+  std::vector<std::int32_t> from;                          // places in the outer list, ascending
+  AlignedArray<double> sp, tx, ty, tz, k_t;                // signed from owner to partner
+  std::vector<std::int32_t> slot_of;                       // of foreign particles; -1 where none
+
+  // Starts a list of the outer pairs that `close(i, j)` accepts.
+  template <class Close>
+  void choose(const Batch& batch, const Close& close) {
+    const std::size_t outer = batch.outer_j.size();
+    from.resize(outer);
+    std::size_t kept = 0;
+    for (std::size_t m = 0; m < outer; ++m) {  // without a branch, which no processor could foresee
+      from[kept] = static_cast<std::int32_t>(m);
+      kept += close(batch.outer_i[m], batch.outer_j[m]) ? 1u : 0u;
+    }
+    from.resize(kept);
+  }
+  std::size_t padded() const { return (from.size() + pair_padding - 1) / pair_padding * pair_padding; }
+  void clear_history(bool with_k_t) {
+    for (auto* column : {&sp, &tx, &ty, &tz}) column->assign(padded(), 0.0);
+    k_t.assign(with_k_t ? padded() : 0, 0.0);
+  }
 };
 
-void install(Batch& batch, const Inner& inner, bool with_k_t) {
-  batch.used = static_cast<std::int32_t>(inner.from.size());
-  batch.padded = (batch.used + pair_padding - 1) / pair_padding * pair_padding;
-  const auto size = static_cast<std::size_t>(batch.padded);
-  for (auto* column : {&batch.i, &batch.j, &batch.slot_j, &batch.from}) column->assign(size, 0);
-  for (auto* column : {&batch.sp, &batch.tx, &batch.ty, &batch.tz}) column->assign(size, 0.0);
-  batch.k_t_last.assign(with_k_t ? size : 0, 0.0);
+Inner& inner_of_this_thread() {
+  static thread_local Inner inner;
+  return inner;
+}
 
-  // Halo slots in the order of first use.
+// Sums of the batch's own particles stay what they are; halo slots are empty afterwards.
+void install(Batch& batch, Inner& inner, const Particles& p) {
+  batch.used = static_cast<std::int32_t>(inner.from.size());
+  batch.padded = static_cast<std::int32_t>(inner.padded());
+  const auto size = inner.padded();
+  for (auto* column : {&batch.i, &batch.j, &batch.slot_j, &batch.from}) column->assign(size, 0);
+  batch.sp.swap(inner.sp), batch.tx.swap(inner.tx), batch.ty.swap(inner.ty), batch.tz.swap(inner.tz);
+  batch.k_t_last.swap(inner.k_t);
+
+  inner.slot_of.resize(static_cast<std::size_t>(p.padded), -1);
   batch.halo.clear();
-  std::vector<std::pair<std::int32_t, std::int32_t>> foreign;  // particle, contact
   for (std::size_t k = 0; k < inner.from.size(); ++k) {
     const auto m = static_cast<std::size_t>(inner.from[k]);
+    const std::int32_t j = batch.outer_j[m], local = j - batch.first;
     batch.from[k] = inner.from[k];
     batch.i[k] = batch.outer_i[m];
-    batch.j[k] = batch.outer_j[m];
-    const PairHistory& h = inner.history[k];
-    batch.sp[k] = h.sp, batch.tx[k] = h.tx, batch.ty[k] = h.ty, batch.tz[k] = h.tz;
-    if (with_k_t) batch.k_t_last[k] = h.k_t;
-    const std::int32_t local = batch.j[k] - batch.first;
-    if (local >= 0 && local < batch.count)
-      batch.slot_j[k] = local;
-    else
-      foreign.emplace_back(batch.j[k], static_cast<std::int32_t>(k));
+    batch.j[k] = j;
+    batch.slot_j[k] = local;
+    if (local >= 0 && local < batch.count) continue;
+    std::int32_t& slot = inner.slot_of[static_cast<std::size_t>(j)];
+    if (slot < 0) slot = 0, batch.halo.push_back(j);
   }
-  std::sort(foreign.begin(), foreign.end());
-  for (const auto& [particle, k] : foreign) {
-    if (batch.halo.empty() || batch.halo.back() != particle) batch.halo.push_back(particle);
-    batch.slot_j[static_cast<std::size_t>(k)] = batch.count + static_cast<std::int32_t>(batch.halo.size()) - 1;
+  std::sort(batch.halo.begin(), batch.halo.end());
+  for (std::size_t k = 0; k < batch.halo.size(); ++k)
+    inner.slot_of[static_cast<std::size_t>(batch.halo[k])] = batch.count + static_cast<std::int32_t>(k);
+  for (std::size_t k = 0; k < inner.from.size(); ++k)
+    if (const std::int32_t slot = inner.slot_of[static_cast<std::size_t>(batch.j[k])]; slot >= 0) batch.slot_j[k] = slot;
+  for (const std::int32_t particle : batch.halo) inner.slot_of[static_cast<std::size_t>(particle)] = -1;
+  for (std::size_t k = inner.from.size(); k < size; ++k) {  // harmless repetitions: i with itself
+    batch.i[k] = batch.j[k] = batch.used > 0 ? batch.i[static_cast<std::size_t>(batch.used) - 1] : batch.first;
+    batch.slot_j[k] = batch.i[k] - batch.first;
+    batch.from[k] = -1;
   }
-  for (std::int32_t k = batch.used; k < batch.padded; ++k) {  // harmless repetitions: i with itself
-    const auto at = static_cast<std::size_t>(k);
-    batch.i[at] = batch.j[at] = batch.used > 0 ? batch.i[static_cast<std::size_t>(batch.used) - 1] : batch.first;
-    batch.slot_j[at] = batch.i[at] - batch.first;
-    batch.from[at] = -1;
-  }
-  batch.sum_i.assign(static_cast<std::size_t>(batch.count) * record_size, 0.0);
-  batch.sum_j.assign((static_cast<std::size_t>(batch.count) + batch.halo.size()) * record_size, 0.0);
+  const std::size_t own = static_cast<std::size_t>(batch.count) * record_size;
+  batch.sum.resize(own);
+  batch.sum.resize(own + batch.halo.size() * record_size);
 }
 
 void connect_halos(std::vector<Batch>& batches, const ParallelFor& parallel) {
@@ -76,12 +98,17 @@ void connect_halos(std::vector<Batch>& batches, const ParallelFor& parallel) {
   });
 }
 
-bool closer_than(const Particles& p, const Domain& domain, std::int32_t i, std::int32_t j, double gap) {
-  const auto a = static_cast<std::size_t>(i), c = static_cast<std::size_t>(j);
-  const double dx = domain.nearest_x(p.x[a] - p.x[c]), dy = domain.nearest_y(p.y[a] - p.y[c]);
-  const double dz = p.z[a] - p.z[c], reach = p.radius_of(i) + p.radius_of(j) + gap;
-  return dx * dx + dy * dy + dz * dz < reach * reach;
-}
+// Whether two particles are closer than their radii and margins.
+struct Closer {
+  const double* rows;
+  const double* margin;
+  const Domain& domain;
+  bool operator()(std::int32_t i, std::int32_t j) const {
+    const double *a = rows + row_size * static_cast<std::size_t>(i), *b = rows + row_size * static_cast<std::size_t>(j);
+    const double reach = (a[3] + margin[static_cast<std::size_t>(i)]) + (b[3] + margin[static_cast<std::size_t>(j)]);
+    return distance2(a, b, domain) < reach * reach;
+  }
+};
 
 [[noreturn]] void lost(const Particles& p, std::int32_t i, std::int32_t j) {
   throw std::logic_error("a touching pair is missing from the rebuilt lists: ids " +
@@ -91,18 +118,26 @@ bool closer_than(const Particles& p, const Domain& domain, std::int32_t i, std::
 
 }  // namespace
 
-std::vector<PairHistory> pair_history(const std::vector<Batch>& batches, const Particles& p) {
-  std::vector<PairHistory> all;
-  for (const Batch& b : batches)
-    for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k) {
-      if (!has_history(b, k)) continue;
-      const std::int32_t ri = p.rank[static_cast<std::size_t>(b.i[k])], rj = p.rank[static_cast<std::size_t>(b.j[k])];
-      const double sign = ri < rj ? 1.0 : -1.0;
-      all.push_back({std::min(ri, rj), std::max(ri, rj), b.sp[k], sign * b.tx[k], sign * b.ty[k], sign * b.tz[k],
-                     b.k_t_last.empty() ? 0.0 : b.k_t_last[k]});
-    }
-  std::sort(all.begin(), all.end(),
-            [](const PairHistory& a, const PairHistory& b) { return std::tie(a.low, a.high) < std::tie(b.low, b.high); });
+PairHistories pair_history(const std::vector<Batch>& batches, const Particles& p) {
+  PairHistories all;
+  all.start.assign(static_cast<std::size_t>(p.count) + 1, 0);
+  const auto for_each = [&](const auto& visit) {
+    for (const Batch& b : batches)
+      for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k)
+        if (has_history(b, k)) visit(b, k, p.rank[static_cast<std::size_t>(b.i[k])], p.rank[static_cast<std::size_t>(b.j[k])]);
+  };
+  for_each([&](const Batch&, std::size_t, std::int32_t ri, std::int32_t rj) {
+    ++all.start[static_cast<std::size_t>(std::min(ri, rj)) + 1];
+  });
+  for (std::size_t k = 1; k < all.start.size(); ++k) all.start[k] += all.start[k - 1];
+  all.pairs.resize(static_cast<std::size_t>(all.start.back()));
+  std::vector<std::int32_t> next(all.start.begin(), all.start.end() - 1);
+  for_each([&](const Batch& b, std::size_t k, std::int32_t ri, std::int32_t rj) {
+    const double sign = ri < rj ? 1.0 : -1.0;
+    const std::int32_t low = std::min(ri, rj), at = next[static_cast<std::size_t>(low)]++;
+    all.pairs[static_cast<std::size_t>(at)] = {low, std::max(ri, rj), b.sp[k], sign * b.tx[k], sign * b.ty[k],
+                                               sign * b.tz[k], b.k_t_last.empty() ? 0.0 : b.k_t_last[k]};
+  });
   return all;
 }
 
@@ -124,69 +159,67 @@ std::vector<PlateHistory> plate_history(const std::vector<Batch>& batches, const
   return all;
 }
 
-void prune(std::vector<Batch>& batches, const Particles& p, const Domain& domain, double gap, bool with_k_t,
+void prune(std::vector<Batch>& batches, const Particles& p, const Domain& domain, const Margins& margins, bool with_k_t,
            const ParallelFor& parallel) {
+  const Closer close{p.rows.data(), margins.of.data(), domain};
   parallel(static_cast<int>(batches.size()), [&](int k) {
     Batch& b = batches[static_cast<std::size_t>(k)];
-    Inner inner;
-    std::size_t old = 0;
-    for (std::size_t m = 0; m < b.outer_j.size(); ++m) {
-      const bool was = old < static_cast<std::size_t>(b.used) && b.from[old] == static_cast<std::int32_t>(m);
-      if (closer_than(p, domain, b.outer_i[m], b.outer_j[m], gap)) {
-        inner.from.push_back(static_cast<std::int32_t>(m));
-        PairHistory h{};
-        if (was) h = {0, 0, b.sp[old], b.tx[old], b.ty[old], b.tz[old], with_k_t ? b.k_t_last[old] : 0.0};
-        inner.history.push_back(h);
-      } else if (was && has_history(b, old)) {
-        lost(p, b.outer_i[m], b.outer_j[m]);
+    Inner& inner = inner_of_this_thread();
+    inner.choose(b, close);
+    inner.clear_history(with_k_t);
+    std::size_t to = 0;
+    for (std::size_t old = 0; old < static_cast<std::size_t>(b.used); ++old) {
+      while (to < inner.from.size() && inner.from[to] < b.from[old]) ++to;
+      if (to < inner.from.size() && inner.from[to] == b.from[old]) {
+        inner.sp[to] = b.sp[old], inner.tx[to] = b.tx[old], inner.ty[to] = b.ty[old], inner.tz[to] = b.tz[old];
+        if (with_k_t) inner.k_t[to] = b.k_t_last[old];
+      } else if (has_history(b, old)) {
+        lost(p, b.i[old], b.j[old]);
       }
-      if (was) ++old;
     }
-    install(b, inner, with_k_t);
+    install(b, inner, p);
   });
   connect_halos(batches, parallel);
 }
 
-void fill_inner(std::vector<Batch>& batches, const Particles& p, const Domain& domain, double gap, bool with_k_t,
-                const std::vector<PairHistory>& history, const ParallelFor& parallel) {
-  // First entry of each rank.
-  std::vector<std::int32_t> start(static_cast<std::size_t>(p.count) + 1, 0);
-  for (const PairHistory& h : history) ++start[static_cast<std::size_t>(h.low) + 1];
-  for (std::size_t k = 1; k < start.size(); ++k) start[k] += start[k - 1];
+void fill_inner(std::vector<Batch>& batches, const Particles& p, const Domain& domain, const Margins& margins,
+                bool with_k_t, const PairHistories& history, const ParallelFor& parallel) {
   std::vector<std::int64_t> found(batches.size(), 0);
+  const Closer close{p.rows.data(), margins.of.data(), domain};
   parallel(static_cast<int>(batches.size()), [&](int k) {
     Batch& b = batches[static_cast<std::size_t>(k)];
-    Inner inner;
-    for (std::size_t m = 0; m < b.outer_j.size(); ++m) {
-      const std::int32_t i = b.outer_i[m], j = b.outer_j[m];
-      if (!closer_than(p, domain, i, j, gap)) continue;
-      const std::int32_t ri = p.rank[static_cast<std::size_t>(i)], rj = p.rank[static_cast<std::size_t>(j)];
-      const std::int32_t low = std::min(ri, rj), high = std::max(ri, rj);
-      PairHistory mine{};
-      for (std::int32_t h = start[static_cast<std::size_t>(low)]; h < start[static_cast<std::size_t>(low) + 1]; ++h) {
-        const PairHistory& entry = history[static_cast<std::size_t>(h)];
+    Inner& inner = inner_of_this_thread();
+    inner.choose(b, close);
+    inner.clear_history(with_k_t);
+    for (std::size_t to = 0; to < inner.from.size(); ++to) {
+      const auto m = static_cast<std::size_t>(inner.from[to]);
+      const std::int32_t ri = p.rank[static_cast<std::size_t>(b.outer_i[m])], rj = p.rank[static_cast<std::size_t>(b.outer_j[m])];
+      const auto low = static_cast<std::size_t>(std::min(ri, rj));
+      const std::int32_t high = std::max(ri, rj);
+      for (std::int32_t h = history.start[low]; h < history.start[low + 1]; ++h) {
+        const PairHistory& entry = history.pairs[static_cast<std::size_t>(h)];
         if (entry.high != high) continue;
         const double sign = ri < rj ? 1.0 : -1.0;
-        mine = {0, 0, entry.sp, sign * entry.tx, sign * entry.ty, sign * entry.tz, entry.k_t};
+        inner.sp[to] = entry.sp, inner.tx[to] = sign * entry.tx, inner.ty[to] = sign * entry.ty;
+        inner.tz[to] = sign * entry.tz;
+        if (with_k_t) inner.k_t[to] = entry.k_t;
         ++found[static_cast<std::size_t>(k)];
         break;
       }
-      inner.from.push_back(static_cast<std::int32_t>(m));
-      inner.history.push_back(mine);
     }
-    install(b, inner, with_k_t);
+    install(b, inner, p);
   });
   std::int64_t carried = 0;
   for (std::int64_t n : found) carried += n;
-  if (carried != static_cast<std::int64_t>(history.size())) {
-    throw std::logic_error("rebuild carried " + std::to_string(carried) + " of " + std::to_string(history.size()) +
+  if (carried != static_cast<std::int64_t>(history.pairs.size())) {
+    throw std::logic_error("rebuild carried " + std::to_string(carried) + " of " + std::to_string(history.pairs.size()) +
                            " touching pairs");
   }
   connect_halos(batches, parallel);
 }
 
-void list_plates(std::vector<Batch>& batches, const Particles& p, const Planes& planes, std::int64_t step, double gap,
-                 const std::vector<PlateHistory>& history, const ParallelFor& parallel) {
+void list_plates(std::vector<Batch>& batches, const Particles& p, const Planes& planes, std::int64_t step, const Margins& margins,
+                 double gap, const std::vector<PlateHistory>& history, const ParallelFor& parallel) {
   parallel(static_cast<int>(batches.size()), [&](int k) {
     Batch& b = batches[static_cast<std::size_t>(k)];
     for (int plate = 0; plate < plate_count; ++plate) {
@@ -197,7 +230,7 @@ void list_plates(std::vector<Batch>& batches, const Particles& p, const Planes& 
         const double position = planes[static_cast<std::size_t>(plate)].position_at(step);
         const AlignedArray<double>& column = shape.axis == 0 ? p.x : shape.axis == 1 ? p.y : p.z;
         for (std::int32_t i = b.first; i < std::min(b.first + b.count, p.count); ++i)
-          if (shape.sign * (column[static_cast<std::size_t>(i)] - position) < p.radius_of(i) + gap) near.push_back(i);
+          if (shape.sign * (column[static_cast<std::size_t>(i)] - position) < p.radius_of(i) + margins.of[static_cast<std::size_t>(i)] + gap) near.push_back(i);
       }
       list.used = static_cast<std::int32_t>(near.size());
       list.padded = (list.used + padding - 1) / padding * padding;

@@ -28,21 +28,28 @@ struct PlateHistory {
   double record[8];         // forces of the last pass, kernels/views.h
 };
 
-// All history of the lists, pairs sorted by (low, high), plates by (plate, rank).
-std::vector<PairHistory> pair_history(const std::vector<Batch>& batches, const Particles& particles);
+// All pairs with history, in buckets by their lower rank.
+struct PairHistories {
+  std::vector<std::int32_t> start;  // bucket of rank r: pairs start[r] .. start[r + 1]
+  std::vector<PairHistory> pairs;
+};
+
+PairHistories pair_history(const std::vector<Batch>& batches, const Particles& particles);
+// All history with planes, sorted by (plate, rank).
 std::vector<PlateHistory> plate_history(const std::vector<Batch>& batches, const Particles& particles);
 
-// Makes the inner lists anew from the outer ones: pairs closer than R_i + R_j + gap. History is carried from the old
-// inner lists. Throws std::logic_error if a pair with history would be lost (a bug of ours).
-void prune(std::vector<Batch>& batches, const Particles& particles, const Domain& domain, double gap, bool with_k_t,
-           const ParallelFor& parallel);
+// Makes the inner lists anew from the outer ones: pairs closer than R_i + R_j + both margins. History is carried from
+// the old inner lists, and the sums of particles, which must be merged, stay. Throws std::logic_error if a pair with
+// history would be lost (a bug of ours).
+void prune(std::vector<Batch>& batches, const Particles& particles, const Domain& domain, const Margins& margins,
+           bool with_k_t, const ParallelFor& parallel);
 
-// The same for fresh batches without inner lists: history comes from `history` (sorted).
-void fill_inner(std::vector<Batch>& batches, const Particles& particles, const Domain& domain, double gap, bool with_k_t,
-                const std::vector<PairHistory>& history, const ParallelFor& parallel);
+// The same for fresh batches without inner lists.
+void fill_inner(std::vector<Batch>& batches, const Particles& particles, const Domain& domain, const Margins& margins,
+                bool with_k_t, const PairHistories& history, const ParallelFor& parallel);
 
-// Lists of the spheres closer to a present plane than `gap`, with history from `history` (sorted).
+// Lists of the spheres closer to a present plane than their margins and `gap`, with history from `history` (sorted).
 void list_plates(std::vector<Batch>& batches, const Particles& particles, const Planes& planes, std::int64_t step,
-                 double gap, const std::vector<PlateHistory>& history, const ParallelFor& parallel);
+                 const Margins& margins, double gap, const std::vector<PlateHistory>& history, const ParallelFor& parallel);
 
 }  // namespace platen

@@ -9,14 +9,6 @@ namespace platen {
 
 namespace {
 
-double nearest(double d, double length) {
-  const double half = 0.5 * length;
-  if (std::fabs(d) <= half || length == 0.0) return d;
-  // Differences of wrapped positions are at most one length off; others take the long way.
-  d -= std::copysign(length, d);
-  return std::fabs(d) <= half ? d : d - length * std::nearbyint(d / length);
-}
-
 struct Bounds {
   double low[3], high[3];
 };
@@ -84,7 +76,7 @@ class CellGrid {
       members_[static_cast<std::size_t>(next[static_cast<std::size_t>(cell_of_[static_cast<std::size_t>(k)])]++)] = k;
   }
 
-  // Calls visit(j) for every particle in the cells around particle i, each once.
+  // Calls visit(first, last) for the members of every cell around particle i, each cell once.
   template <class Visit>
   void around(const Particles& p, std::int32_t i, const Visit& visit) const {
     const auto at = static_cast<std::size_t>(i);
@@ -94,20 +86,20 @@ class CellGrid {
       length[axis] = 0;
       for (int step = -1; step <= 1; ++step) {
         int k = c[axis] + step;
-        if (wraps_[axis])
-          k = (k + cells_[axis]) % cells_[axis];
-        else if (k < 0 || k >= cells_[axis])
+        if (wraps_[axis]) {
+          if (cells_[axis] <= step + 1) continue;  // one or two cells along a periodic axis
+          k = k < 0 ? k + cells_[axis] : k >= cells_[axis] ? k - cells_[axis] : k;
+        } else if (k < 0 || k >= cells_[axis]) {
           continue;
-        bool seen = false;  // one or two cells along a periodic axis
-        for (int m = 0; m < length[axis]; ++m) seen = seen || list[axis][m] == k;
-        if (!seen) list[axis][length[axis]++] = k;
+        }
+        list[axis][length[axis]++] = k;
       }
     }
     for (int a = 0; a < length[2]; ++a)
       for (int b = 0; b < length[1]; ++b)
         for (int d = 0; d < length[0]; ++d) {
           const auto cell = static_cast<std::size_t>(index(list[0][d], list[1][b], list[2][a]));
-          for (std::int32_t m = start_[cell]; m < start_[cell + 1]; ++m) visit(members_[static_cast<std::size_t>(m)]);
+          visit(members_.data() + start_[cell], members_.data() + start_[cell + 1]);
         }
   }
 
@@ -126,21 +118,18 @@ class CellGrid {
 
 // Greedy colouring of the batches: no two that share a pair get the same colour.
 void colour(std::vector<Batch>& batches) {
-  std::vector<char> taken;
+  std::vector<int> taken_by(batches.size() + 1, -1);
   for (Batch& batch : batches) batch.colour = -1;
-  for (Batch& batch : batches) {
-    taken.assign(batches.size() + 1, 0);
+  for (int k = 0; k < static_cast<int>(batches.size()); ++k) {
+    Batch& batch = batches[static_cast<std::size_t>(k)];
     for (int other : batch.partners)
-      if (batches[static_cast<std::size_t>(other)].colour >= 0)
-        taken[static_cast<std::size_t>(batches[static_cast<std::size_t>(other)].colour)] = 1;
-    batch.colour = static_cast<int>(std::find(taken.begin(), taken.end(), 0) - taken.begin());
+      if (const int c = batches[static_cast<std::size_t>(other)].colour; c >= 0) taken_by[static_cast<std::size_t>(c)] = k;
+    batch.colour = 0;
+    while (taken_by[static_cast<std::size_t>(batch.colour)] == k) ++batch.colour;
   }
 }
 
 }  // namespace
-
-double Domain::nearest_x(double d) const { return nearest(d, width); }
-double Domain::nearest_y(double d) const { return nearest(d, depth); }
 
 int BatchOf::operator()(std::int32_t particle) const {
   return static_cast<int>(std::upper_bound(starts.begin(), starts.end(), particle) - starts.begin()) - 1;
@@ -176,47 +165,47 @@ std::vector<std::int32_t> morton_order(const Particles& particles) {
   return order;
 }
 
-std::vector<Batch> make_batches(const Particles& p, const Domain& domain, double skin, int size,
+std::vector<Batch> make_batches(const Particles& p, const Domain& domain, const Margins& margins, int size,
                                 const ParallelFor& parallel) {
   const int vectors = p.padded / padding;
   const int count = std::max(1, std::min(vectors, static_cast<int>(std::lround(static_cast<double>(p.padded) / size))));
   std::vector<Batch> batches(static_cast<std::size_t>(count));
-  BatchOf batch_of;
+  std::vector<std::int32_t> batch_of(static_cast<std::size_t>(std::max(vectors, 1)), 0);  // of each vector of particles
   for (int k = 0; k < count; ++k) {
-    const auto edge = [&](int m) { return static_cast<std::int32_t>(static_cast<std::int64_t>(vectors) * m / count) * padding; };
+    const auto edge = [&](int m) { return static_cast<std::int32_t>(static_cast<std::int64_t>(vectors) * m / count); };
     Batch& batch = batches[static_cast<std::size_t>(k)];
-    batch.first = edge(k);
-    batch.count = edge(k + 1) - edge(k);
-    batch_of.starts.push_back(batch.first);
+    batch.first = edge(k) * padding;
+    batch.count = (edge(k + 1) - edge(k)) * padding;
+    std::fill(batch_of.begin() + edge(k), batch_of.begin() + edge(k + 1), k);
   }
 
   double largest = p.common_radius;
   if (!p.equal) largest = *std::max_element(p.radius.begin(), p.radius.begin() + p.count);
-  const CellGrid grid(p, domain, 2.0 * largest + skin);
+  const CellGrid grid(p, domain, 2.0 * (largest + margins.largest));
 
   // Every pair within a batch once, every pair across batches from both sides; then the owner keeps it.
   parallel(count, [&](int k) {
     Batch& batch = batches[static_cast<std::size_t>(k)];
-    std::vector<std::int32_t> close;
+    const auto expected = static_cast<std::size_t>(batch.count) * 8;
+    batch.outer_i.reserve(expected), batch.outer_j.reserve(expected);
+    std::vector<char> seen(static_cast<std::size_t>(count), 0);
     for (std::int32_t i = batch.first; i < std::min(batch.first + batch.count, p.count); ++i) {
-      const auto a = static_cast<std::size_t>(i);
-      const double Ri = p.radius_of(i);
-      close.clear();
-      grid.around(p, i, [&](std::int32_t j) {
-        const bool own = j >= batch.first && j < batch.first + batch.count;
-        if (own && j <= i) return;
-        const auto c = static_cast<std::size_t>(j);
-        const double dx = domain.nearest_x(p.x[a] - p.x[c]), dy = domain.nearest_y(p.y[a] - p.y[c]);
-        const double dz = p.z[a] - p.z[c], reach = Ri + p.radius_of(j) + skin;
-        if (dx * dx + dy * dy + dz * dz < reach * reach) close.push_back(j);
+      const double* row = p.rows.data() + row_size * static_cast<std::size_t>(i);
+      const double own = row[3] + margins.of[static_cast<std::size_t>(i)];
+      grid.around(p, i, [&](const std::int32_t* first, const std::int32_t* last) {
+        for (; first != last; ++first) {
+          const std::int32_t j = *first;
+          if (j <= i && j >= batch.first) continue;
+          const double* other = p.rows.data() + row_size * static_cast<std::size_t>(j);
+          const double reach = own + (other[3] + margins.of[static_cast<std::size_t>(j)]);
+          if (!(distance2(row, other, domain) < reach * reach)) continue;
+          batch.outer_i.push_back(i), batch.outer_j.push_back(j);
+          seen[static_cast<std::size_t>(batch_of[static_cast<std::size_t>(j / padding)])] = 1;
+        }
       });
-      std::sort(close.begin(), close.end());
-      for (std::int32_t j : close) batch.outer_i.push_back(i), batch.outer_j.push_back(j);
     }
-    for (std::int32_t j : batch.outer_j)
-      if (j < batch.first || j >= batch.first + batch.count) batch.partners.push_back(batch_of(j));
-    std::sort(batch.partners.begin(), batch.partners.end());
-    batch.partners.erase(std::unique(batch.partners.begin(), batch.partners.end()), batch.partners.end());
+    for (int other = 0; other < count; ++other)
+      if (other != k && seen[static_cast<std::size_t>(other)]) batch.partners.push_back(other);
   });
   colour(batches);
   parallel(count, [&](int k) {
@@ -225,7 +214,7 @@ std::vector<Batch> make_batches(const Particles& p, const Domain& domain, double
     for (std::size_t m = 0; m < batch.outer_j.size(); ++m) {
       const std::int32_t j = batch.outer_j[m];
       const bool own = j >= batch.first && j < batch.first + batch.count;
-      if (!own && batches[static_cast<std::size_t>(batch_of(j))].colour < batch.colour) continue;
+      if (!own && batches[static_cast<std::size_t>(batch_of[static_cast<std::size_t>(j / padding)])].colour < batch.colour) continue;
       batch.outer_i[kept] = batch.outer_i[m];
       batch.outer_j[kept++] = j;
     }

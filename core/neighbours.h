@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/batches.h"
+#include "core/margins.h"
 #include "core/particles.h"
 
 namespace platen {
@@ -16,17 +17,32 @@ using ParallelFor = std::function<void(int count, const std::function<void(int)>
 
 struct Domain {
   double width = 0.0, depth = 0.0;  // periodic lengths [m]; 0 where not periodic
+  double inverse_width = 0.0, inverse_depth = 0.0;
+
+  Domain() = default;
+  Domain(double w, double d) : width(w), depth(d), inverse_width(w > 0.0 ? 1.0 / w : 0.0), inverse_depth(d > 0.0 ? 1.0 / d : 0.0) {}
+
   // The image of a difference nearest to 0, as the contact kernel takes it.
-  double nearest_x(double d) const;
-  double nearest_y(double d) const;
+  double nearest_x(double d) const { return nearest(d, width, inverse_width); }
+  double nearest_y(double d) const { return nearest(d, depth, inverse_depth); }
+  static double nearest(double d, double length, double inverse) {
+    const double magic = 0x1.8p52;
+    return d - length * ((d * inverse + magic) - magic);
+  }
 };
+
+// Squared distance of the centres of two rows, nearest images [m2].
+inline double distance2(const double* a, const double* b, const Domain& domain) {
+  const double dx = domain.nearest_x(a[0] - b[0]), dy = domain.nearest_y(a[1] - b[1]), dz = a[2] - b[2];
+  return dx * dx + dy * dy + dz * dz;
+}
 
 // Order along a Morton curve: order[new place] = old place.
 std::vector<std::int32_t> morton_order(const Particles& particles);
 
 // Cuts the particles into batches of about `size` and fills their outer lists with every pair closer than
-// R_i + R_j + skin. Particles must be in Morton order.
-std::vector<Batch> make_batches(const Particles& particles, const Domain& domain, double skin, int size,
+// R_i + R_j + both margins. Particles must be in Morton order, rows up to date.
+std::vector<Batch> make_batches(const Particles& particles, const Domain& domain, const Margins& margins, int size,
                                 const ParallelFor& parallel);
 
 // Batch of a particle.

@@ -216,20 +216,16 @@ void Simulation::parallel(int count, const std::function<void(int)>& body) {
 // plates are added to the finished sum in the order of planes.
 void Simulation::merge(Batch& b) {
   for (const Incoming& in : b.incoming) {
-    const double* from = batches_[static_cast<std::size_t>(in.batch)].sum_j.data() + record_size * static_cast<std::size_t>(in.slot);
-    double* to = b.sum_j.data() + record_size * static_cast<std::size_t>(in.local);
+    const double* from = batches_[static_cast<std::size_t>(in.batch)].sum.data() + record_size * static_cast<std::size_t>(in.slot);
+    double* to = b.sum.data() + record_size * static_cast<std::size_t>(in.local);
     for (int k = 0; k < record_size; ++k) to[k] += from[k];
   }
   for (const PlateList& list : b.plates) {
     for (std::size_t m = 0; m < static_cast<std::size_t>(list.used); ++m) {
       if (!(list.overlap[m] > 0.0)) continue;
-      const auto at = record_size * static_cast<std::size_t>(list.particle[m] - b.first);
-      double *sum_i = b.sum_i.data() + at, *sum_j = b.sum_j.data() + at;
+      double* sum = b.sum.data() + record_size * static_cast<std::size_t>(list.particle[m] - b.first);
       const double* record = list.records.data() + record_size * m;
-      for (int k = 0; k < record_size; ++k) {
-        sum_j[k] = (sum_i[k] + sum_j[k]) + record[k];
-        sum_i[k] = 0.0;
-      }
+      for (int k = 0; k < record_size; ++k) sum[k] += record[k];
     }
   }
 }
@@ -243,28 +239,25 @@ void Simulation::integrate(Batch& b, const MotionConstants& c) {
   const MotionBatch batch{column(p.x), column(p.y), column(p.z), column(p.vx), column(p.vy), column(p.vz), column(p.ux),
                           column(p.uy), column(p.uz), column(p.inverse_mass), column(p.mass), column(p.radius),
                           column(p.inverse_radius), p.rows.data() + row_size * first, p.image.data() + 2 * first,
-                          b.sum_i.data(), b.sum_j.data(), b.count};
+                          b.sum.data(), room_.data() + first, b.count};
   MotionTotals totals;
-  // The places that fill up the last vector rest where they are, but pass for spheres that move with the others.
-  const auto filled = static_cast<std::size_t>(std::max(b.first, p.count)), end = first + static_cast<std::size_t>(b.count);
-  for (auto k = filled; k < end; ++k) p.vx[k] = c.mean_x, p.vy[k] = c.mean_y, p.vz[k] = c.mean_z;
   kernels_.motion(batch, c, totals);
+  // The places that fill up the last vector rest where they are.
+  const auto filled = static_cast<std::size_t>(std::max(b.first, p.count)), end = first + static_cast<std::size_t>(b.count);
   for (auto k = filled; k < end; ++k) {
     for (auto* a : {&p.x, &p.y, &p.z, &p.vx, &p.vy, &p.vz, &p.ux, &p.uy, &p.uz}) (*a)[k] = 0.0;
     p.image[2 * k] = p.image[2 * k + 1] = 0;
   }
-  b.largest_speed = std::sqrt(totals.largest_speed2);
-  b.path += b.largest_speed * c.drift;
+  b.largest_pace = std::max(b.largest_pace, totals.largest_pace);
   b.rolling += totals.rolling;
   b.out_of_range = b.out_of_range || totals.out_of_range;
 }
 
 void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law) {
   merged_[static_cast<std::size_t>(&b - batches_.data())] = 0;
-  std::memset(b.sum_j.data(), 0, b.sum_j.size() * sizeof(double));
+  std::memset(b.sum.data(), 0, b.sum.size() * sizeof(double));
   const PairBatch pairs{particles_.rows.data(), b.i.data(), b.j.data(), b.slot_j.data(), b.sp.data(), b.tx.data(),
-                        b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum_i.data(),
-                        b.sum_j.data(), b.first, b.padded, b.first + b.count,
+                        b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum.data(), b.first, b.padded, b.first + b.count,
                         particles_.x.data(), particles_.y.data(), particles_.z.data(), particles_.vx.data(),
                         particles_.vy.data(), particles_.vz.data(), particles_.ux.data(), particles_.uy.data(),
                         particles_.uz.data()};
@@ -326,7 +319,7 @@ void Simulation::collect() {
 }
 
 void Simulation::run_chunk(int steps) {
-  for (Batch& b : batches_) b.path = 0.0;
+  for (Batch& b : batches_) b.largest_pace = 0.0;
   law_.dt = plate_law_.dt = dt_;
   motion_.kick = motion_.drift = dt_;
   motion_.mean_x = mean_[0], motion_.mean_y = mean_[1], motion_.mean_z = mean_[2];
@@ -353,29 +346,35 @@ void Simulation::advance(std::int64_t steps) {
   const FloatMode mode;
   ensure_forces();
   bool one_by_one = false;
+  std::int64_t at_most = engine_.unroll;
   while (steps > 0) {
-    const int n = prepare_lists(one_by_one ? 1 : steps);
+    const int n = prepare_lists(std::min<std::int64_t>(steps, one_by_one ? 1 : at_most));
     save();
     run_chunk(n);
-    double path = 0.0;
+    double pace = 0.0;
     bool bad = false;
-    largest_speed_ = 0.0;
     for (const Batch& b : batches_) {
-      path = std::max(path, b.path);
-      largest_speed_ = std::max(largest_speed_, b.largest_speed);
+      pace = std::max(pace, b.largest_pace);
       bad = bad || b.out_of_range;
     }
-    // Were the lists wide enough? If not, a pair may have been missed, and a force out of range may be its consequence:
-    // from the saved state once more with wider lists. Lists change no bits, so nobody sees it.
-    const double planes = plane_moved_ + plane_path(n);
-    if (std::isfinite(path) && !(2.0 * (moved_ + path) <= gap_ && moved_ + path + planes <= plate_gap_)) {
+    // Did the lists hold? If not, a pair may have been missed, and a force out of range may be its consequence: from the
+    // saved state once more with wider lists. Lists change no bits, so nobody sees it.
+    if (!(std::sqrt(pace) * (n * dt_) <= 1.0)) {
+      double fastest = 0.0;
+      for (std::size_t k = 0; k < static_cast<std::size_t>(particles_.count); ++k) fastest = std::max(fastest, own_speed(k));
+      const bool known = std::isfinite(fastest);
       restore();
       counters_.redone_steps += n;
-      largest_speed_ = 1.25 * std::max(largest_speed_, path / (n * dt_));
+      at_most = std::max(1, n / 2);
+      redo_margin_ = std::max({2.0 * redo_margin_, 1.25 * (known ? fastest : 0.0) * dt_ * at_most, 0.01 * largest_radius_});
       lists_stale_ = true;
-      continue;
+      if (n > 1 || redo_margin_ < 4.0 * widest_margin()) continue;
+      step_ += n;
+      fail("a sphere moves farther in one step than lists can follow; use a smaller time step");
     }
-    if (bad || !std::isfinite(path)) {
+    at_most = engine_.unroll;
+    redo_margin_ = 0.0;
+    if (bad) {
       if (n > 1) {  // once more step by step, so that the message tells where it began
         restore();
         one_by_one = true;

@@ -72,7 +72,7 @@ struct SimulationSetup {
 struct EngineCounters {
   std::int64_t rebuilds = 0, prunes = 0, redone_steps = 0;
   int batches = 0;
-  double skin = 0.0, gap = 0.0;
+  double skin = 0.0, gap = 0.0;  // of the lists, means over the spheres [m]
   std::int64_t bytes = 0;   // of the large arrays
 };
 
@@ -140,11 +140,17 @@ class Simulation {
   void run_task(const Task& task);
   void collect();
   void rebuild();
-  void rebuild_with(std::vector<PairHistory> pairs);
+  void rebuild_with(const PairHistories& pairs);
   void prune_lists();
+  void merge_all();
   void keep_sums(AlignedArray<double>& sums);
   void put_sums(const AlignedArray<double>& sums);
-  double displaced(const AlignedArray<double>& reference, const double (&drift)[3]);
+  double displacement(std::size_t k, const AlignedArray<double>& reference, const double (&drift)[3]) const;
+  double own_speed(std::size_t k) const;
+  void choose_horizon();
+  double widest_margin() const;
+  bool choose_margins(bool fresh);
+  int look(int wanted);
   void remember(AlignedArray<double>& reference, double (&drift)[3]);
   int prepare_lists(std::int64_t wanted);
   double plane_path(int steps) const;
@@ -189,13 +195,15 @@ class Simulation {
   double inserted_ = 0.0, removed_ = 0.0;
 
   // Lists.
-  double skin_ = 0.0, gap_ = 0.0, plate_gap_ = 0.0;
+  Margins inner_, outer_;
+  AlignedArray<double> room_;                   // 1/(what each sphere may still move)^2 [1/m2]
+  double plate_gap_ = 0.0;                      // bound of the planes' motion that lists allow [m]
+  double redo_margin_ = 0.0;                    // least margin after steps had to be done again [m]
+  int horizon_ = 64;                            // steps that lists should hold
   AlignedArray<double> at_rebuild_, at_prune_;  // positions then, 3 per particle
   double mean_[3] = {0, 0, 0};                  // common velocity taken out of displacements [m/s]
   double drift_at_rebuild_[3] = {0, 0, 0};      // displacement by mean_ since the rebuild [m]
   double drift_at_prune_[3] = {0, 0, 0};
-  double largest_speed_ = 0.0;   // relative to mean_, last step [m/s]
-  double moved_ = 0.0;           // largest displacement since the prune, at the start of the chunk [m]
   double plane_moved_ = 0.0;     // bound of the planes' motion since the prune [m]
   bool lists_stale_ = false;     // prune before the next step
   int unroll_ = 1;               // steps of the graph

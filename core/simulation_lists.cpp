@@ -1,7 +1,7 @@
 // Lists of a Simulation: when they are made anew and how wide, and the state to which a run of steps can go back.
 #include <algorithm>
 #include <cmath>
-#include <cstring>
+#include <limits>
 
 #include "core/float_mode.h"
 #include "core/simulation_detail.h"
@@ -9,24 +9,34 @@
 namespace platen {
 
 namespace {
-constexpr double usual_skin = 0.25, widest_skin = 1.0;  // of the largest radius
-constexpr double smallest_gap = 0.02;                   // of the largest radius
-constexpr double caution = 1.2;                         // speeds may grow within a run of steps
+// Margins, in largest radii: of a sphere at rest, and how much wider the outer ones are.
+constexpr double smallest_inner = 0.003, smallest_outer = 0.08;
+constexpr double widest = 0.5;
+constexpr double caution = 1.2;           // speeds may grow until the lists are looked at again
+constexpr int shortest_horizon = 16, longest_horizon = 512;  // steps from prune to prune
+constexpr int outer_life = 8;             // horizons from rebuild to rebuild of a bed in steady motion
+constexpr int worthwhile = 8;             // steps that lists must still hold, lest they are made anew
+// What it costs to look at a pair in the kernel, at a pair of the outer list in a prune, and a prune for each sphere.
+constexpr double pair_cost = 10.0, outer_cost = 3.0, sphere_cost = 20.0;
 }  // namespace
 
-// Total of each particle's sums, by rank: forces outlive the lists they were found with.
+// Adds what other batches hold of each batch's sums, so that every batch has its own in full.
+void Simulation::merge_all() {
+  parallel(static_cast<int>(batches_.size()), [&](int k) {
+    if (!merged_[static_cast<std::size_t>(k)]) merge(batches_[static_cast<std::size_t>(k)]);
+    merged_[static_cast<std::size_t>(k)] = 1;
+  });
+}
+
+// Total of each particle's sums, by rank: forces outlive the batches they were found with.
 void Simulation::keep_sums(AlignedArray<double>& sums) {
   sums.resize(static_cast<std::size_t>(particles_.count) * record_size);
+  merge_all();
   parallel(static_cast<int>(batches_.size()), [&](int k) {
-    Batch& b = batches_[static_cast<std::size_t>(k)];
-    if (!merged_[static_cast<std::size_t>(k)]) merge(b);
-    merged_[static_cast<std::size_t>(k)] = 1;
+    const Batch& b = batches_[static_cast<std::size_t>(k)];
     for (std::int32_t m = 0; m < b.count && b.first + m < particles_.count; ++m) {
-      double* to = sums.data() + record_size * static_cast<std::size_t>(particles_.rank[static_cast<std::size_t>(b.first + m)]);
-      for (int field = 0; field < record_size; ++field) {
-        const auto at = record_size * static_cast<std::size_t>(m) + static_cast<std::size_t>(field);
-        to[field] = b.sum_i[at] + b.sum_j[at];
-      }
+      const auto rank = static_cast<std::size_t>(particles_.rank[static_cast<std::size_t>(b.first + m)]);
+      std::copy_n(b.sum.data() + record_size * static_cast<std::size_t>(m), record_size, sums.data() + record_size * rank);
     }
   });
 }
@@ -37,7 +47,7 @@ void Simulation::put_sums(const AlignedArray<double>& sums) {
     Batch& b = batches_[static_cast<std::size_t>(k)];
     for (std::int32_t m = 0; m < b.count && b.first + m < particles_.count; ++m) {
       const auto rank = static_cast<std::size_t>(particles_.rank[static_cast<std::size_t>(b.first + m)]);
-      std::copy_n(sums.data() + record_size * rank, record_size, b.sum_j.data() + record_size * static_cast<std::size_t>(m));
+      std::copy_n(sums.data() + record_size * rank, record_size, b.sum.data() + record_size * static_cast<std::size_t>(m));
     }
   });
 }
@@ -51,40 +61,41 @@ void Simulation::remember(AlignedArray<double>& reference, double (&drift)[3]) {
   std::fill(drift, drift + 3, 0.0);
 }
 
-// Largest displacement since the positions were remembered, relative to the common drift [m].
-double Simulation::displaced(const AlignedArray<double>& reference, const double (&drift)[3]) {
+// Displacement of particle k since the positions were remembered, relative to the common drift [m].
+double Simulation::displacement(std::size_t k, const AlignedArray<double>& reference, const double (&drift)[3]) const {
   const auto n = static_cast<std::size_t>(particles_.count);
-  std::vector<double> largest(batches_.size(), 0.0);
-  parallel(static_cast<int>(batches_.size()), [&](int k) {
-    const Batch& b = batches_[static_cast<std::size_t>(k)];
-    double most = 0.0;
-    const auto end = std::min(static_cast<std::size_t>(b.first + b.count), n);
-    for (auto m = static_cast<std::size_t>(b.first); m < end; ++m) {
-      const double dx = domain_.nearest_x(particles_.x[m] - reference[m] - drift[0]);
-      const double dy = domain_.nearest_y(particles_.y[m] - reference[n + m] - drift[1]);
-      const double dz = particles_.z[m] - reference[2 * n + m] - drift[2];
-      most = std::max(most, dx * dx + dy * dy + dz * dz);
-    }
-    largest[static_cast<std::size_t>(k)] = most;
-  });
-  return std::sqrt(*std::max_element(largest.begin(), largest.end()));
+  const double dx = domain_.nearest_x(particles_.x[k] - reference[k] - drift[0]);
+  const double dy = domain_.nearest_y(particles_.y[k] - reference[n + k] - drift[1]);
+  const double dz = particles_.z[k] - reference[2 * n + k] - drift[2];
+  return std::sqrt(dx * dx + dy * dy + dz * dz);
 }
 
-// The common velocity, and the largest one relative to it.
+// Speed relative to the common velocity [m/s].
+double Simulation::own_speed(std::size_t k) const {
+  const double a = particles_.vx[k] - mean_[0], b = particles_.vy[k] - mean_[1], c = particles_.vz[k] - mean_[2];
+  return std::sqrt(a * a + b * b + c * c);
+}
+
 void Simulation::mean_velocity() {
-  const auto n = static_cast<std::size_t>(particles_.count);
-  const AlignedArray<double>* columns[3] = {&particles_.vx, &particles_.vy, &particles_.vz};
+  struct Sum {
+    double v[3] = {0, 0, 0};
+  };
+  std::vector<Sum> sums(batches_.size());
+  parallel(static_cast<int>(batches_.size()), [&](int index) {
+    const Batch& b = batches_[static_cast<std::size_t>(index)];
+    const AlignedArray<double>* columns[3] = {&particles_.vx, &particles_.vy, &particles_.vz};
+    for (int axis = 0; axis < 3; ++axis) {
+      double sum = 0.0;
+      for (std::int32_t k = b.first; k < std::min(b.first + b.count, particles_.count); ++k)
+        sum += (*columns[axis])[static_cast<std::size_t>(k)];
+      sums[static_cast<std::size_t>(index)].v[axis] = sum;
+    }
+  });
   for (int axis = 0; axis < 3; ++axis) {
     double sum = 0.0;
-    for (std::size_t k = 0; k < n; ++k) sum += (*columns[axis])[k];
-    mean_[axis] = n > 0 ? sum / static_cast<double>(n) : 0.0;
+    for (const Sum& s : sums) sum += s.v[axis];
+    mean_[axis] = particles_.count > 0 ? sum / particles_.count : 0.0;
   }
-  double largest = 0.0;
-  for (std::size_t k = 0; k < n; ++k) {
-    const double a = particles_.vx[k] - mean_[0], b = particles_.vy[k] - mean_[1], c = particles_.vz[k] - mean_[2];
-    largest = std::max(largest, a * a + b * b + c * c);
-  }
-  largest_speed_ = std::max(largest_speed_, std::sqrt(largest));
 }
 
 // Bound of what a plane moves against the common drift in `steps` steps [m].
@@ -97,56 +108,118 @@ double Simulation::plane_path(int steps) const {
   return fastest * dt_ * steps;
 }
 
+// How long lists should hold [steps]. Longer means wider margins, hence more pairs in every step, and fewer prunes:
+// the cheapest is where both cost the same.
+void Simulation::choose_horizon() {
+  double listed = 0.0, outer = 0.0, margin = 0.0;
+  for (const Batch& b : batches_) listed += b.used, outer += static_cast<double>(b.outer_j.size());
+  const auto n = static_cast<std::size_t>(particles_.count);
+  for (std::size_t k = 0; k < n; ++k) margin += inner_.of[k];
+  if (n == 0 || !(margin > 0.0)) return;
+  const double least = smallest_inner * largest_radius_ * static_cast<double>(n);
+  const double widened = (listed - static_cast<double>(contacts_)) * std::max(0.0, margin - least) / margin;
+  const double prune_cost = outer_cost * outer + sphere_cost * static_cast<double>(n);
+  const double per_step = pair_cost * std::max(widened, 0.0) / horizon_;
+  const double best = per_step > 0.0 ? std::sqrt(prune_cost / per_step) : longest_horizon;
+  horizon_ = static_cast<int>(std::clamp(best, static_cast<double>(shortest_horizon), static_cast<double>(longest_horizon)));
+}
+
+// Widest margin that a sphere may have [m].
+double Simulation::widest_margin() const {
+  const double wish = std::max(0.5 * engine_.skin, widest * largest_radius_);
+  if (!periodic()) return wish;
+  return std::min(wish, std::max(0.0, 0.25 * std::min(domain_.width, domain_.depth) - largest_radius_));
+}
+
+// Margins that hold for about a horizon, by the present speeds; false where the outer lists are too narrow for them.
+bool Simulation::choose_margins(bool fresh) {
+  const auto n = static_cast<std::size_t>(particles_.count);
+  const double R = largest_radius_, most = widest_margin();
+  inner_.of.resize(static_cast<std::size_t>(particles_.padded));
+  if (fresh) outer_.of.resize(static_cast<std::size_t>(particles_.padded));
+  bool enough = true;
+  double inner_sum = 0.0, outer_sum = 0.0;
+  inner_.largest = 0.0;
+  if (fresh) outer_.largest = 0.0;
+  for (std::size_t k = 0; k < n; ++k) {
+    const double path = caution * own_speed(k) * dt_;  // of one step
+    const double needed = 1.01 * (path + gravity_ * dt_ * dt_);
+    const double wish = engine_.inner_gap > 0.0 ? 0.5 * engine_.inner_gap : std::max(smallest_inner * R, horizon_ * path);
+    double inner = std::min(std::max({wish, redo_margin_, needed}), most);
+    if (needed > most)
+      fail("a sphere moves " + std::to_string(path / R) + " radii in one step: more than lists can follow; use a smaller time step");
+    if (fresh) {
+      const double further = engine_.skin > 0.0 ? 0.5 * engine_.skin : inner + std::max(smallest_outer * R, outer_life * horizon_ * path);
+      outer_.of[k] = std::clamp(further, inner, most);
+      outer_sum += outer_.of[k], outer_.largest = std::max(outer_.largest, outer_.of[k]);
+    } else {
+      // What the outer lists leave, as long as it lasts for some steps.
+      const double left = outer_.of[k] - displacement(k, at_rebuild_, drift_at_rebuild_);
+      enough = enough && left >= std::max({std::min(inner, worthwhile * path), std::min(redo_margin_, most), needed});
+      inner = std::min(inner, left);
+    }
+    inner_.of[k] = inner;
+    inner_sum += inner, inner_.largest = std::max(inner_.largest, inner);
+  }
+  if (n > 0) counters_.gap = 2.0 * inner_sum / static_cast<double>(n);
+  if (n > 0 && fresh) counters_.skin = 2.0 * outer_sum / static_cast<double>(n);
+  plate_gap_ = std::max(0.05 * R, 1.5 * plane_path(horizon_));
+  return enough;
+}
+
+// For how many steps, at most `wanted`, the lists will hold if speeds do not grow much; 0 where not for one. Sets the
+// room that each sphere has left, which the steps watch.
+int Simulation::look(int wanted) {
+  room_.resize(static_cast<std::size_t>(particles_.padded));
+  std::vector<double> tight(batches_.size(), 0.0), bare(batches_.size(), 0.0);
+  parallel(static_cast<int>(batches_.size()), [&](int index) {
+    const Batch& b = batches_[static_cast<std::size_t>(index)];
+    double fastest = 0.0, smallest = 0.0;
+    for (std::int32_t local = 0; local < b.count; ++local) {
+      const auto k = static_cast<std::size_t>(b.first + local);
+      if (b.first + local >= particles_.count) {  // what fills up the last vector
+        room_[k] = 0.0;
+        continue;
+      }
+      const double left = inner_.of[k] - displacement(k, at_prune_, drift_at_prune_);
+      const double inverse = left > 0.0 ? 1.0 / left : std::numeric_limits<double>::infinity();
+      room_[k] = inverse * inverse;
+      fastest = std::max(fastest, own_speed(k) * inverse);
+      smallest = std::max(smallest, inverse);
+    }
+    tight[static_cast<std::size_t>(index)] = fastest, bare[static_cast<std::size_t>(index)] = smallest;
+  });
+  const double fastest = caution * *std::max_element(tight.begin(), tight.end());
+  const double closest = gravity_ * dt_ * *std::max_element(bare.begin(), bare.end());
+  const auto holds = [&](int steps) {  // a free fall or a push may add speed; a kick by gravity is the least to expect
+    return (fastest + closest * steps) * (dt_ * steps) <= 1.0 && plane_moved_ + plane_path(steps) <= plate_gap_;
+  };
+  int steps = wanted;
+  while (steps > 0 && !holds(steps)) steps = steps > 1 ? steps * 3 / 4 : 0;
+  return steps;
+}
+
 // Makes sure that the lists will hold for some steps, and says for how many: at most `wanted`.
 int Simulation::prepare_lists(std::int64_t wanted) {
-  const double R = largest_radius_;
   const int n = static_cast<int>(std::min<std::int64_t>(wanted, engine_.unroll));
-  // A free fall or a push may add speed within the run; a kick by gravity is the least to expect.
-  const auto path = [&](int steps) { return (caution * largest_speed_ + gravity_ * dt_ * steps) * dt_ * steps; };
-  if (lists_valid_ && !lists_stale_) {
-    moved_ = displaced(at_prune_, drift_at_prune_);
-    int fits = n;
-    while (fits > 1 && !(2.0 * (moved_ + path(fits)) <= gap_ && moved_ + path(fits) + plane_moved_ + plane_path(fits) <= plate_gap_))
-      fits /= 2;
-    const bool one = 2.0 * (moved_ + path(1)) <= gap_ && moved_ + path(1) + plane_moved_ + plane_path(1) <= plate_gap_;
-    if (one && fits == n) return n;
-  }
-
   mean_velocity();
-  double widest = widest_skin * R;
-  if (periodic()) widest = std::max(0.0, 0.5 * std::min(domain_.width, domain_.depth) - 2.0 * R);
-  const double skin_wish = engine_.skin > 0.0 ? engine_.skin : usual_skin * R;
-  const double gap_wish = engine_.inner_gap > 0.0 ? engine_.inner_gap : std::max(smallest_gap * R, 3.0 * path(n));
-  const double most = std::min(widest, std::max(skin_wish, widest_skin * R));
-  double gap = std::min(gap_wish, 0.5 * most);
-  if (2.0 * path(1) * caution > gap) gap = 2.0 * path(1) * caution;
-  if (gap > most) fail("a sphere moves " + std::to_string(path(1) / R) + " radii in one step: more than lists can follow; use a smaller time step");
-  gap_ = gap;
-  plate_gap_ = std::max({0.3 * R, gap, 4.0 * (path(n) + plane_path(n))});
-
-  const bool rebuilt = !lists_valid_ || 2.0 * displaced(at_rebuild_, drift_at_rebuild_) + gap_ > skin_;
-  if (rebuilt) {
-    skin_ = std::min(most, std::max(skin_wish, 2.0 * gap_));
-    skin_ = std::max(skin_, gap_);
-    rebuild();
-  } else {
+  if (lists_valid_ && !lists_stale_)
+    if (const int steps = look(n); steps >= std::min(n, worthwhile)) return steps;
+  choose_horizon();
+  if (lists_valid_ && choose_margins(false))
     prune_lists();
-  }
-  moved_ = 0.0;
+  else
+    rebuild();
   lists_stale_ = false;
-  int fits = n;
-  while (fits > 1 && !(2.0 * path(fits) <= gap_ && path(fits) + plane_path(fits) <= plate_gap_)) fits /= 2;
-  return fits;
+  return std::max(1, look(n));
 }
 
 void Simulation::prune_lists() {
-  AlignedArray<double> sums;
-  keep_sums(sums);
+  merge_all();
   const auto plates = plate_history(batches_, particles_);
   const auto run = [this](int count, const std::function<void(int)>& body) { parallel(count, body); };
-  prune(batches_, particles_, domain_, gap_, keeps_k_t(), run);
-  list_plates(batches_, particles_, planes_, step_, plate_gap_, plates, run);
-  put_sums(sums);
+  prune(batches_, particles_, domain_, inner_, keeps_k_t(), run);
+  list_plates(batches_, particles_, planes_, step_, inner_, plate_gap_, plates, run);
   remember(at_prune_, drift_at_prune_);
   plane_moved_ = 0.0;
   ++counters_.prunes;
@@ -154,24 +227,20 @@ void Simulation::prune_lists() {
 
 void Simulation::rebuild() { rebuild_with(pair_history(batches_, particles_)); }
 
-void Simulation::rebuild_with(std::vector<PairHistory> pairs) {
-  if (skin_ == 0.0) {
-    skin_ = engine_.skin > 0.0 ? engine_.skin : usual_skin * largest_radius_;
-    gap_ = engine_.inner_gap > 0.0 ? std::min(engine_.inner_gap, skin_) : smallest_gap * largest_radius_;
-    plate_gap_ = 0.3 * largest_radius_;
-  }
+void Simulation::rebuild_with(const PairHistories& pairs) {
   AlignedArray<double> sums;
   const bool had_forces = !batches_.empty();
   if (had_forces) keep_sums(sums);
   const auto plates = plate_history(batches_, particles_);
   const auto run = [this](int count, const std::function<void(int)>& body) { parallel(count, body); };
   particles_.permute(morton_order(particles_));
+  choose_margins(true);
   const int automatic = std::clamp(particles_.count / (16 * std::max(1, engine_.threads)) / padding * padding, 128, 1024);
   graph_.reset();
   table_.reset();
-  batches_ = make_batches(particles_, domain_, skin_, engine_.batch > 0 ? engine_.batch : automatic, run);
-  fill_inner(batches_, particles_, domain_, gap_, keeps_k_t(), pairs, run);
-  list_plates(batches_, particles_, planes_, step_, plate_gap_, plates, run);
+  batches_ = make_batches(particles_, domain_, outer_, engine_.batch > 0 ? engine_.batch : automatic, run);
+  fill_inner(batches_, particles_, domain_, inner_, keeps_k_t(), pairs, run);
+  list_plates(batches_, particles_, planes_, step_, inner_, plate_gap_, plates, run);
   merged_.assign(batches_.size(), 1);
   if (had_forces) put_sums(sums);
   // The graph is as long as a usual run between two looks; a thousand batches need no long graphs to keep cores busy.
@@ -183,7 +252,6 @@ void Simulation::rebuild_with(std::vector<PairHistory> pairs) {
   lists_valid_ = true;
   ++counters_.rebuilds;
   counters_.batches = static_cast<int>(batches_.size());
-  counters_.skin = skin_, counters_.gap = gap_;
 }
 
 void Simulation::rebuild_now() {
@@ -198,18 +266,24 @@ void Simulation::open_sides() {
   ensure_forces();
   // Every centre is inside the box already; pairs that met through a face are apart from now on.
   FixedSum before(energy_unit_), after(energy_unit_);
-  std::vector<PairHistory> kept;
   add_pair_energy(before);
-  for (const PairHistory& h : pair_history(batches_, particles_)) {
-    const auto a = static_cast<std::size_t>(particles_.place[static_cast<std::size_t>(h.low)]);
-    const auto b = static_cast<std::size_t>(particles_.place[static_cast<std::size_t>(h.high)]);
-    const double dx = particles_.x[a] - particles_.x[b], dy = particles_.y[a] - particles_.y[b];
-    if (domain_.nearest_x(dx) == dx && domain_.nearest_y(dy) == dy) kept.push_back(h);
+  const PairHistories all = pair_history(batches_, particles_);
+  PairHistories kept;
+  kept.start.assign(1, 0);
+  for (std::size_t low = 0; low + 1 < all.start.size(); ++low) {
+    for (std::int32_t k = all.start[low]; k < all.start[low + 1]; ++k) {
+      const PairHistory& h = all.pairs[static_cast<std::size_t>(k)];
+      const auto a = static_cast<std::size_t>(particles_.place[static_cast<std::size_t>(h.low)]);
+      const auto b = static_cast<std::size_t>(particles_.place[static_cast<std::size_t>(h.high)]);
+      const double dx = particles_.x[a] - particles_.x[b], dy = particles_.y[a] - particles_.y[b];
+      if (domain_.nearest_x(dx) == dx && domain_.nearest_y(dy) == dy) kept.pairs.push_back(h);
+    }
+    kept.start.push_back(static_cast<std::int32_t>(kept.pairs.size()));
   }
   domain_ = {};
   law_.width = law_.depth = law_.inverse_width = law_.inverse_depth = 0.0;
   motion_.width = motion_.depth = 0.0;
-  rebuild_with(std::move(kept));
+  rebuild_with(kept);
   add_pair_energy(after);
   removed_ += before.value() - after.value();
   forces_valid_ = false;
@@ -221,6 +295,7 @@ void Simulation::save() {
   s.columns.resize(9 * n);
   s.image.resize(2 * n);
   s.batches.resize(batches_.size());
+  merge_all();
   parallel(static_cast<int>(batches_.size()), [&](int k) {
     Batch& b = batches_[static_cast<std::size_t>(k)];
     const auto first = static_cast<std::size_t>(b.first), count = static_cast<std::size_t>(b.count);
@@ -230,12 +305,10 @@ void Simulation::save() {
       std::copy_n(a->data() + first, count, s.columns.data() + static_cast<std::size_t>(column++) * n + first);
     std::copy_n(particles_.image.data() + 2 * first, 2 * count, s.image.data() + 2 * first);
     Saved::OfBatch& to = s.batches[static_cast<std::size_t>(k)];
-    if (!merged_[static_cast<std::size_t>(k)]) merge(b);
-    merged_[static_cast<std::size_t>(k)] = 1;
     for_each_history(b, [&](std::size_t size) { to.history.resize(size); },
                      [&](double* data, std::size_t size, std::size_t at) { std::copy_n(data, size, to.history.data() + at); });
     to.sums.resize(count * record_size);
-    for (std::size_t m = 0; m < count * record_size; ++m) to.sums[m] = b.sum_i[m] + b.sum_j[m];
+    std::copy_n(b.sum.data(), count * record_size, to.sums.data());
     to.contacts = b.pair_totals.contacts;
   });
 }
@@ -254,8 +327,7 @@ void Simulation::restore() {
     const Saved::OfBatch& from = s.batches[k];
     for_each_history(b, [](std::size_t) {},
                      [&](double* data, std::size_t size, std::size_t at) { std::copy_n(from.history.data() + at, size, data); });
-    std::fill(b.sum_i.begin(), b.sum_i.end(), 0.0);
-    std::copy_n(from.sums.data(), from.sums.size(), b.sum_j.data());
+    std::copy_n(from.sums.data(), from.sums.size(), b.sum.data());
     merged_[k] = 1;
     const auto contacts = from.contacts;
     b.pair_totals = {};

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <tuple>
 #include <string>
 
 #include "core/float_mode.h"
@@ -126,17 +127,16 @@ Measures Simulation::measure(bool stored_energies) {
     const Particles& p = particles_;
     for (std::int32_t local = 0; local < b.count && b.first + local < p.count; ++local) {
       const auto k = static_cast<std::size_t>(b.first + local);
-      const double *si = b.sum_i.data() + record_size * static_cast<std::size_t>(local),
-                   *sj = b.sum_j.data() + record_size * static_cast<std::size_t>(local);
+      const double* s = b.sum.data() + record_size * static_cast<std::size_t>(local);
       const double m = p.mass_of(b.first + local), R = p.radius_of(b.first + local);
       const double h = half / m;
-      const double v[3] = {p.vx[k] + h * (si[0] + sj[0]), p.vy[k] + h * (si[1] + sj[1]),
-                           p.vz[k] + h * (si[2] + sj[2]) - half * gravity_};
-      const double u[3] = {p.ux[k] + 2.5 * h * (si[4] + sj[4]), p.uy[k] + 2.5 * h * (si[5] + sj[5]),
-                           p.uz[k] + 2.5 * h * (si[6] + sj[6])};
+      const double v[3] = {p.vx[k] + h * s[0], p.vy[k] + h * s[1],
+                           p.vz[k] + h * s[2] - half * gravity_};
+      const double u[3] = {p.ux[k] + 2.5 * h * s[4], p.uy[k] + 2.5 * h * s[5],
+                           p.uz[k] + 2.5 * h * s[6]};
       // Rolling friction up to the full time, as in motion_kernel.h.
       const double turning2 = u[0] * u[0] + u[1] * u[1] + u[2] * u[2], turning = std::sqrt(turning2);
-      const double loss = 2.5 * h * (motion_.mu_r * (si[3] + sj[3]) + (si[7] + sj[7]));
+      const double loss = 2.5 * h * (motion_.mu_r * s[3] + s[7]);
       const double left = loss < turning ? (turning - loss) / turning : 0.0;
       part.kinetic.add(0.5 * m * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) + 0.2 * m * turning2 * left * left);
       const double before = p.ux[k] * u[0] + p.uy[k] * u[1] + p.uz[k] * u[2];  // u(n-1/2) . u
@@ -323,7 +323,10 @@ std::uint64_t Simulation::state_hash(const std::string& extra) {
     for (const auto* column : {&p.x, &p.y, &p.z, &p.vx, &p.vy, &p.vz, &p.ux, &p.uy, &p.uz}) number((*column)[k]);
     put(p.image.data() + 2 * k, 2 * sizeof(std::int32_t));
   }
-  for (const PairHistory& h : pair_history(batches_, particles_)) {
+  std::vector<PairHistory> pairs = pair_history(batches_, particles_).pairs;
+  std::sort(pairs.begin(), pairs.end(),
+            [](const PairHistory& a, const PairHistory& b) { return std::tie(a.low, a.high) < std::tie(b.low, b.high); });
+  for (const PairHistory& h : pairs) {
     // k_t of the last step serves the ledger alone, which must not change the hash.
     if (h.sp == 0.0 && h.tx == 0.0 && h.ty == 0.0 && h.tz == 0.0) continue;
     put(&h.low, sizeof h.low), put(&h.high, sizeof h.high);

@@ -272,10 +272,11 @@ PLATEN_INLINE typename I::Real rounded(typename I::Real x, const Quantum& q) {
 }
 
 // Rounds the contributions, turns them into records and adds them up: the owner's by a sum carried from contact to
-// contact (consecutive contacts share owners), the partner's into its slot.
+// contact (consecutive contacts share owners), the partner's into its slot. No partner of a run of contacts is their
+// owner, so what is carried misses nothing.
 template <class I, SceneTraits scene>
 PLATEN_INLINE void output_pairs(const Chunk<scene>& chunk, int at, const PairBatch& b, const LawConstants& c,
-                                std::int32_t k, typename I::Record& carried, std::int32_t& owner) {
+                                std::int32_t k, const double* nothing, typename I::Record& carried, std::int32_t& owner) {
   typename I::Record records[Chunk<scene>::sides][I::width];
   for (int side = 0; side < Chunk<scene>::sides; ++side) {
     typename I::Real fields[8];
@@ -285,10 +286,16 @@ PLATEN_INLINE void output_pairs(const Chunk<scene>& chunk, int at, const PairBat
   }
   for (int lane = 0; lane < I::width; ++lane) {
     const std::int32_t i = b.i[k + lane];
-    carried = I::add_if(i == owner, records[0][lane], carried);
+    double* own = b.sum + record_size * static_cast<std::int64_t>(i - b.first);
+    // Of a new owner the sum so far is loaded. Of the old one it must not be, even in vain: it would wait for the last
+    // store to the same place.
+    const bool again = i == owner;
+    const auto place = reinterpret_cast<std::uintptr_t>(own), none = reinterpret_cast<std::uintptr_t>(nothing);
+    const auto* so_far = reinterpret_cast<const double*>(place ^ ((place ^ none) & (std::uintptr_t{0} - again)));
+    carried = I::add(I::select(again, carried, I::load_record(so_far)), records[0][lane]);
     owner = i;
-    I::store_record(b.sum_i + record_size * static_cast<std::int64_t>(i - b.first), carried);
-    double* slot = b.sum_j + record_size * static_cast<std::int64_t>(b.slot_j[k + lane]);
+    I::store_record(own, carried);
+    double* slot = b.sum + record_size * static_cast<std::int64_t>(b.slot_j[k + lane]);
     I::store_record(slot, I::add_reaction(I::load_record(slot), records[Chunk<scene>::sides - 1][lane]));
   }
 }
@@ -354,6 +361,7 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
   std::int32_t owner = -1;
   bool fine = true;
   Chunk<scene> chunk;
+  alignas(64) const double nothing[record_size] = {};
   for (std::int32_t start = 0; start < b.count; start += chunk_size) {
     const int count = start + chunk_size < b.count ? chunk_size : b.count - start;
     if (c.width > 0.0)
@@ -364,7 +372,7 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
         chunk.template put_pairs<I>(at, fetch_pairs<I, scene, exact, false>(b, c, start + at));
     fine = law_of_chunk<typename Interleaved<I>::Type, scene, exact>(chunk, b, c, start, count, totals) && fine;
     for (int at = 0; at < count; at += I::width)
-      output_pairs<I, scene>(chunk, at, b, c, start + at, carried, owner);
+      output_pairs<I, scene>(chunk, at, b, c, start + at, nothing, carried, owner);
   }
   totals.out_of_range = totals.out_of_range || !fine;
 }

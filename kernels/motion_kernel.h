@@ -18,10 +18,8 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
   bool strange = false;
   for (std::int32_t k = 0; k < b.count; k += I::width) {
     typename I::Record records[I::width];
-    for (int lane = 0; lane < I::width; ++lane) {
-      const std::int64_t at = record_size * static_cast<std::int64_t>(k + lane);
-      records[lane] = I::add(I::load_record(b.sum_i + at), I::load_record(b.sum_j + at));
-    }
+    for (int lane = 0; lane < I::width; ++lane)
+      records[lane] = I::load_record(b.sum + record_size * static_cast<std::int64_t>(k + lane));
     Real f[8];
     I::from_records(records, f);
     Real inverse_m, m, R, inverse_R;
@@ -78,11 +76,11 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
 
     const Vec3<I> excess = {v.x - I::set(c.mean_x), v.y - I::set(c.mean_y), v.z - I::set(c.mean_z)};
     const Real speed2 = dot(excess, excess);
-    largest = I::max(largest, speed2);
+    largest = I::max(largest, speed2 * I::load(b.inverse_room2 + k));
     strange = strange || I::any(I::negate(speed2 + dot(u, u) < I::set(0x1p60)));
   }
-  const double speed2 = I::largest(largest);
-  totals.largest_speed2 = totals.largest_speed2 > speed2 ? totals.largest_speed2 : speed2;
+  const double pace = I::largest(largest);
+  totals.largest_pace = totals.largest_pace > pace ? totals.largest_pace : pace;
   if constexpr (energy && rolling)
     totals.rolling += static_cast<std::int64_t>(I::sum(rolled) * c.energy.inverse);
   totals.out_of_range = totals.out_of_range || strange;

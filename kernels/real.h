@@ -87,7 +87,7 @@ struct Scalar {
     for (int k = 0; k < 8; ++k) r.v[k] = a.v[k] + b.v[k];
     return r;
   }
-  static PLATEN_INLINE Record add_if(bool yes, const Record& a, const Record& b) { return yes ? add(a, b) : a; }
+  static PLATEN_INLINE Record select(bool yes, const Record& a, const Record& b) { return yes ? a : b; }
   // a and what b does to the other side: the reaction of a force (the first three), the rest as it is.
   static PLATEN_INLINE Record add_reaction(const Record& a, const Record& b) {
     Record r;
@@ -196,9 +196,9 @@ struct Avx2 {
   static PLATEN_INLINE Record add(const Record& a, const Record& b) {
     return {_mm256_add_pd(a.lo, b.lo), _mm256_add_pd(a.hi, b.hi)};
   }
-  static PLATEN_INLINE Record add_if(bool yes, const Record& a, const Record& b) {
+  static PLATEN_INLINE Record select(bool yes, const Record& a, const Record& b) {
     const __m256d m = _mm256_castsi256_pd(_mm256_set1_epi64x(-static_cast<long long>(yes)));
-    return {_mm256_add_pd(a.lo, _mm256_and_pd(b.lo, m)), _mm256_add_pd(a.hi, _mm256_and_pd(b.hi, m))};
+    return {_mm256_blendv_pd(b.lo, a.lo, m), _mm256_blendv_pd(b.hi, a.hi, m)};
   }
   static PLATEN_INLINE Record add_reaction(const Record& a, const Record& b) {
     return {_mm256_fmadd_pd(b.lo, _mm256_set_pd(1.0, -1.0, -1.0, -1.0), a.lo), _mm256_add_pd(a.hi, b.hi)};
@@ -328,8 +328,8 @@ struct Avx512 {
   static PLATEN_INLINE Record load_record(const double* p) { return {_mm512_load_pd(p)}; }
   static PLATEN_INLINE void store_record(double* p, const Record& r) { _mm512_store_pd(p, r.v); }
   static PLATEN_INLINE Record add(const Record& a, const Record& b) { return {_mm512_add_pd(a.v, b.v)}; }
-  static PLATEN_INLINE Record add_if(bool yes, const Record& a, const Record& b) {
-    return {_mm512_mask_add_pd(a.v, static_cast<__mmask8>(-static_cast<int>(yes)), a.v, b.v)};
+  static PLATEN_INLINE Record select(bool yes, const Record& a, const Record& b) {
+    return {_mm512_mask_blend_pd(static_cast<__mmask8>(-static_cast<int>(yes)), b.v, a.v)};
   }
   static PLATEN_INLINE Record add_reaction(const Record& a, const Record& b) {
     return {_mm512_fmadd_pd(b.v, _mm512_set_pd(1.0, 1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0), a.v)};

@@ -80,8 +80,6 @@ struct Twice {
   static PLATEN_INLINE Record load_record(const double* p) { return I::load_record(p); }
   static PLATEN_INLINE void store_record(double* p, const Record& r) { I::store_record(p, r); }
   static PLATEN_INLINE Record add(const Record& a, const Record& b) { return I::add(a, b); }
-  static PLATEN_INLINE Record keep(bool yes, const Record& a) { return I::keep(yes, a); }
-  static PLATEN_INLINE Record react(const Record& a) { return I::react(a); }
 };
 
 // What the law runs on. Measured: 10 % faster with AVX-512; AVX2 has too few registers for it [docs/performance.md].

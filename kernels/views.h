@@ -69,7 +69,7 @@ struct PairBatch {
   const std::int32_t *i, *j, *slot_j;
   double *sp, *tx, *ty, *tz;
   double* k_t_last;     // exponent other than 1: k_t of the step before; null otherwise
-  double *sum_i, *sum_j;  // records; sum_i by i - first, sum_j by slot_j
+  double* sum;          // records: by i - first, and by slot_j
   std::int32_t first;   // first particle of the batch
   std::int32_t count;
   std::int32_t end;     // one past the batch's last particle
@@ -135,12 +135,13 @@ struct MotionBatch {
   const double *inverse_mass, *mass, *radius, *inverse_radius;  // null where spheres are equal
   double* rows;            // of this batch's first particle
   std::int32_t* image;     // 2 per particle
-  const double *sum_i, *sum_j;  // records; forces are their sum
+  const double* sum;       // records: the forces
+  const double* inverse_room2;  // 1/(how far a particle may move until the lists must be looked at)^2 [1/m2]
   std::int32_t count;      // multiple of padding
 };
 
 struct MotionTotals {
-  double largest_speed2 = 0.0;   // of |v - mean|^2 [m2/s2]
+  double largest_pace = 0.0;     // of |v - mean|^2 / room^2 [1/s2]
   std::int64_t rolling = 0;      // rolling dissipation, quanta
   bool out_of_range = false;     // a velocity is not finite or absurd
 };

@@ -190,10 +190,10 @@ class RealChecks {
       for (int k = 0; k < 8; ++k) same("to_records", a[k], 10.0 * lane + k + 0.5);
       I::store_record(b, I::add(records[lane], I::load_record(a)));
       for (int k = 0; k < 8; ++k) same("add", b[k], a[k] + a[k]);
-      I::store_record(b, I::add_if(true, records[lane], I::load_record(a)));
-      for (int k = 0; k < 8; ++k) same("add_if", b[k], a[k] + a[k]);
-      I::store_record(b, I::add_if(false, records[lane], I::load_record(a)));
-      for (int k = 0; k < 8; ++k) same("add_if not", b[k], a[k]);
+      I::store_record(b, I::select(true, records[lane], I::zero_record()));
+      for (int k = 0; k < 8; ++k) same("select", b[k], a[k]);
+      I::store_record(b, I::select(false, records[lane], I::zero_record()));
+      for (int k = 0; k < 8; ++k) same("select not", b[k], 0.0);
       I::store_record(b, I::add_reaction(I::load_record(a), records[W - 1 - lane]));
       for (int k = 0; k < 8; ++k) {
         const double other = 10.0 * (W - 1 - lane) + k + 0.5;
@@ -203,8 +203,8 @@ class RealChecks {
     I::store_record(b, I::zero_record());
     for (int k = 0; k < 8; ++k) same("zero_record", b[k], 0.0);
     for (double& x : a) x = std::numeric_limits<double>::quiet_NaN();
-    I::store_record(b, I::add_if(false, records[0], I::load_record(a)));  // what is left out may be anything
-    for (int k = 0; k < 8; ++k) same("add_if no NaN", b[k], k + 0.5);
+    I::store_record(b, I::select(false, I::load_record(a), records[0]));  // what is left out may be anything
+    for (int k = 0; k < 8; ++k) same("select no NaN", b[k], k + 0.5);
   }
 
  public:

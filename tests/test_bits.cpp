@@ -249,7 +249,7 @@ TEST(Bits, DefaultIsWithinItsBoundOfReproducible) {
         const Batch& batch = sim.batches()[0];
         const auto at = record_size * static_cast<std::size_t>(sim.state().place[static_cast<std::size_t>(rank)]) +
                         static_cast<std::size_t>(field);
-        return batch.sum_i[at] + batch.sum_j[at];
+        return batch.sum[at];
       };
       for (std::int32_t rank = 0; rank < a.state().count; ++rank)
         for (int field = 0; field < 7; ++field) {

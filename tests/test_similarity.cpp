@@ -61,8 +61,7 @@ void compare(Simulation& small, Simulation& large) {
       for (std::int32_t m = 0; m < batch.count && batch.first + m < sim.state().count; ++m)
         for (std::size_t field = 0; field < record_size; ++field)
           all[record_size * static_cast<std::size_t>(sim.state().rank[static_cast<std::size_t>(batch.first + m)]) + field] =
-              batch.sum_i[record_size * static_cast<std::size_t>(m) + field] +
-              batch.sum_j[record_size * static_cast<std::size_t>(m) + field];
+              batch.sum[record_size * static_cast<std::size_t>(m) + field];
     return all;
   };
   expect_scaled("sums of forces and torques", sums(small), sums(large), 4.0);
