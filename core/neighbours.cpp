@@ -41,7 +41,7 @@ std::uint64_t spread(std::uint64_t v) {  // 21 bits, two zeros between each
 // A grid of cells at least `reach` wide over the particles; periodic where the domain is.
 class CellGrid {
  public:
-  CellGrid(const Particles& p, const Domain& domain, double reach) {
+  CellGrid(const Particles& p, const Domain& domain, const Margins& margins, double reach) {
     const Bounds b = bounds_of(p);
     const double periodic[3] = {domain.width, domain.depth, 0.0};
     double extent[3];
@@ -72,36 +72,58 @@ class CellGrid {
     for (std::size_t c = 1; c < start_.size(); ++c) start_[c] += start_[c - 1];
     members_.resize(static_cast<std::size_t>(p.count));
     std::vector<std::int32_t> next(start_.begin(), start_.end() - 1);
-    for (std::int32_t k = 0; k < p.count; ++k)
-      members_[static_cast<std::size_t>(next[static_cast<std::size_t>(cell_of_[static_cast<std::size_t>(k)])]++)] = k;
+    for (std::int32_t k = 0; k < p.count; ++k) {
+      const double* row = p.rows.data() + row_size * static_cast<std::size_t>(k);
+      const auto at = static_cast<std::size_t>(next[static_cast<std::size_t>(cell_of_[static_cast<std::size_t>(k)])]++);
+      members_[at] = {row[0], row[1], row[2], row[3] + margins.of[static_cast<std::size_t>(k)], k};
+    }
+    lengths_[0] = domain.width, lengths_[1] = domain.depth, lengths_[2] = 0.0;
   }
 
-  // Calls visit(first, last) for the members of every cell around particle i, each cell once.
+  struct Member {
+    double x, y, z, reach;
+    std::int32_t particle;
+  };
+
+  // Calls visit(first, last, x, y, z) for the members of the cells around particle i, each cell once, with the place of
+  // i from which they are to be seen: that of the image next to them. Cells along x lie next to each other in memory.
   template <class Visit>
   void around(const Particles& p, std::int32_t i, const Visit& visit) const {
-    const auto at = static_cast<std::size_t>(i);
-    const int c[3] = {coordinate(p.x[at], 0), coordinate(p.y[at], 1), coordinate(p.z[at], 2)};
-    int list[3][3], length[3];
+    const double* row = p.rows.data() + row_size * static_cast<std::size_t>(i);
+    struct Range {
+      int first, last;
+      double shift;
+    };
+    Range ranges[3][3];
+    int length[3];
     for (int axis = 0; axis < 3; ++axis) {
+      const int c = coordinate(row[axis], axis), n = cells_[axis];
       length[axis] = 0;
-      for (int step = -1; step <= 1; ++step) {
-        int k = c[axis] + step;
-        if (wraps_[axis]) {
-          if (cells_[axis] <= step + 1) continue;  // one or two cells along a periodic axis
-          k = k < 0 ? k + cells_[axis] : k >= cells_[axis] ? k - cells_[axis] : k;
-        } else if (k < 0 || k >= cells_[axis]) {
-          continue;
-        }
-        list[axis][length[axis]++] = k;
+      const auto add = [&](int first, int last, double shift) { ranges[axis][length[axis]++] = {first, last, shift}; };
+      if (!wraps_[axis]) {
+        add(std::max(c - 1, 0), std::min(c + 1, n - 1), 0.0);
+      } else if (n < 3) {
+        add(0, n - 1, 0.0);  // all of them; images are looked for pair by pair
+      } else {
+        if (c == 0) add(n - 1, n - 1, lengths_[axis]);
+        add(std::max(c - 1, 0), std::min(c + 1, n - 1), 0.0);
+        if (c == n - 1) add(0, 0, -lengths_[axis]);
       }
     }
     for (int a = 0; a < length[2]; ++a)
-      for (int b = 0; b < length[1]; ++b)
-        for (int d = 0; d < length[0]; ++d) {
-          const auto cell = static_cast<std::size_t>(index(list[0][d], list[1][b], list[2][a]));
-          visit(members_.data() + start_[cell], members_.data() + start_[cell + 1]);
-        }
+      for (int z = ranges[2][a].first; z <= ranges[2][a].last; ++z)
+        for (int b = 0; b < length[1]; ++b)
+          for (int y = ranges[1][b].first; y <= ranges[1][b].last; ++y)
+            for (int d = 0; d < length[0]; ++d) {
+              const Range& x = ranges[0][d];
+              visit(members_.data() + start_[static_cast<std::size_t>(index(x.first, y, z))],
+                    members_.data() + start_[static_cast<std::size_t>(index(x.last, y, z)) + 1], row[0] + x.shift,
+                    row[1] + ranges[1][b].shift, row[2]);
+            }
   }
+
+  // Whether an image has to be looked for pair by pair: a periodic axis with one or two cells.
+  bool few_cells() const { return (wraps_[0] && cells_[0] < 3) || (wraps_[1] && cells_[1] < 3); }
 
  private:
   int coordinate(double x, int axis) const {
@@ -111,9 +133,10 @@ class CellGrid {
   std::int32_t index(int a, int b, int c) const { return (c * cells_[1] + b) * cells_[0] + a; }
 
   bool wraps_[3];
-  double low_[3], inverse_[3];
+  double low_[3], inverse_[3], lengths_[3];
   int cells_[3];
-  std::vector<std::int32_t> start_, members_, cell_of_;
+  std::vector<std::int32_t> start_, cell_of_;
+  std::vector<Member> members_;
 };
 
 // Greedy colouring of the batches: no two that share a pair get the same colour.
@@ -181,28 +204,34 @@ std::vector<Batch> make_batches(const Particles& p, const Domain& domain, const 
 
   double largest = p.common_radius;
   if (!p.equal) largest = *std::max_element(p.radius.begin(), p.radius.begin() + p.count);
-  const CellGrid grid(p, domain, 2.0 * (largest + margins.largest));
+  const CellGrid grid(p, domain, margins, 2.0 * (largest + margins.largest));
+  const bool few_cells = grid.few_cells();
 
   // Every pair within a batch once, every pair across batches from both sides; then the owner keeps it.
   parallel(count, [&](int k) {
     Batch& batch = batches[static_cast<std::size_t>(k)];
-    const auto expected = static_cast<std::size_t>(batch.count) * 8;
-    batch.outer_i.reserve(expected), batch.outer_j.reserve(expected);
     std::vector<char> seen(static_cast<std::size_t>(count), 0);
+    std::vector<std::int32_t> close;  // partners of one particle; grows to the most candidates that one had
+    std::vector<std::int32_t>& to_i = batch.outer_i;
+    std::vector<std::int32_t>& to_j = batch.outer_j;
+    to_i.reserve(static_cast<std::size_t>(batch.count) * 8), to_j.reserve(static_cast<std::size_t>(batch.count) * 8);
     for (std::int32_t i = batch.first; i < std::min(batch.first + batch.count, p.count); ++i) {
-      const double* row = p.rows.data() + row_size * static_cast<std::size_t>(i);
-      const double own = row[3] + margins.of[static_cast<std::size_t>(i)];
-      grid.around(p, i, [&](const std::int32_t* first, const std::int32_t* last) {
-        for (; first != last; ++first) {
-          const std::int32_t j = *first;
-          if (j <= i && j >= batch.first) continue;
-          const double* other = p.rows.data() + row_size * static_cast<std::size_t>(j);
-          const double reach = own + (other[3] + margins.of[static_cast<std::size_t>(j)]);
-          if (!(distance2(row, other, domain) < reach * reach)) continue;
-          batch.outer_i.push_back(i), batch.outer_j.push_back(j);
-          seen[static_cast<std::size_t>(batch_of[static_cast<std::size_t>(j / padding)])] = 1;
+      const double own = p.radius_of(i) + margins.of[static_cast<std::size_t>(i)];
+      std::size_t kept = 0;
+      grid.around(p, i, [&](const CellGrid::Member* first, const CellGrid::Member* last, double x, double y, double z) {
+        close.resize(std::max(close.size(), kept + static_cast<std::size_t>(last - first)));
+        for (; first != last; ++first) {  // without a branch, which no processor could foresee
+          double dx = x - first->x, dy = y - first->y;
+          const double dz = z - first->z, reach = own + first->reach;
+          if (few_cells) dx = domain.nearest_x(dx), dy = domain.nearest_y(dy);
+          const std::int32_t j = first->particle;
+          close[kept] = j;
+          kept += static_cast<std::size_t>((dx * dx + dy * dy + dz * dz < reach * reach) & ((j > i) | (j < batch.first)));
         }
       });
+      for (std::size_t m = 0; m < kept; ++m) seen[static_cast<std::size_t>(batch_of[static_cast<std::size_t>(close[m] / padding)])] = 1;
+      to_i.insert(to_i.end(), kept, i);
+      to_j.insert(to_j.end(), close.begin(), close.begin() + static_cast<std::ptrdiff_t>(kept));
     }
     for (int other = 0; other < count; ++other)
       if (other != k && seen[static_cast<std::size_t>(other)]) batch.partners.push_back(other);

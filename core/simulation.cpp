@@ -366,6 +366,7 @@ void Simulation::advance(std::int64_t steps) {
       restore();
       counters_.redone_steps += n;
       at_most = std::max(1, n / 2);
+      kick_factor_ = std::min(8.0, 1.5 * kick_factor_);
       redo_margin_ = std::max({2.0 * redo_margin_, 1.25 * (known ? fastest : 0.0) * dt_ * at_most, 0.01 * largest_radius_});
       lists_stale_ = true;
       if (n > 1 || redo_margin_ < 4.0 * widest_margin()) continue;

@@ -199,6 +199,7 @@ class Simulation {
   AlignedArray<double> room_;                   // 1/(what each sphere may still move)^2 [1/m2]
   double plate_gap_ = 0.0;                      // bound of the planes' motion that lists allow [m]
   double redo_margin_ = 0.0;                    // least margin after steps had to be done again [m]
+  double kick_factor_ = 1.0;                    // on the mean speed, for spheres that will be hit
   int horizon_ = 64;                            // steps that lists should hold
   AlignedArray<double> at_rebuild_, at_prune_;  // positions then, 3 per particle
   double mean_[3] = {0, 0, 0};                  // common velocity taken out of displacements [m/s]

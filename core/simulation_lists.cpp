@@ -121,7 +121,8 @@ void Simulation::choose_horizon() {
   const double prune_cost = outer_cost * outer + sphere_cost * static_cast<double>(n);
   const double per_step = pair_cost * std::max(widened, 0.0) / horizon_;
   const double best = per_step > 0.0 ? std::sqrt(prune_cost / per_step) : longest_horizon;
-  horizon_ = static_cast<int>(std::clamp(best, static_cast<double>(shortest_horizon), static_cast<double>(longest_horizon)));
+  const double next = std::clamp(best, 0.5 * horizon_, 1.25 * horizon_ + 1.0);  // step by step, lest it swings
+  horizon_ = static_cast<int>(std::clamp(next, static_cast<double>(shortest_horizon), static_cast<double>(longest_horizon)));
 }
 
 // Widest margin that a sphere may have [m].
@@ -137,13 +138,19 @@ bool Simulation::choose_margins(bool fresh) {
   const double R = largest_radius_, most = widest_margin();
   inner_.of.resize(static_cast<std::size_t>(particles_.padded));
   if (fresh) outer_.of.resize(static_cast<std::size_t>(particles_.padded));
+  // Who is slow may be hit: a sphere's margin is never below what the mean speed, times a factor that grows whenever
+  // steps had to be done again, takes.
+  double mean_speed = 0.0;
+  for (std::size_t k = 0; k < n; ++k) mean_speed += own_speed(k);
+  const double least_path = n > 0 ? caution * kick_factor_ * mean_speed / static_cast<double>(n) * dt_ : 0.0;
+  kick_factor_ = std::max(1.0, 0.97 * kick_factor_);
   bool enough = true;
   double inner_sum = 0.0, outer_sum = 0.0;
   inner_.largest = 0.0;
   if (fresh) outer_.largest = 0.0;
   for (std::size_t k = 0; k < n; ++k) {
-    const double path = caution * own_speed(k) * dt_;  // of one step
-    const double needed = 1.01 * (path + gravity_ * dt_ * dt_);
+    const double now = caution * own_speed(k) * dt_, path = std::max(now, least_path);  // of one step
+    const double needed = 1.01 * (now + gravity_ * dt_ * dt_);
     const double wish = engine_.inner_gap > 0.0 ? 0.5 * engine_.inner_gap : std::max(smallest_inner * R, horizon_ * path);
     double inner = std::min(std::max({wish, redo_margin_, needed}), most);
     if (needed > most)

@@ -310,10 +310,26 @@ PLATEN_INLINE void for_each_energy(const PairEnergies<I>& energy, const Visit& v
   if constexpr (scene.exponent != Exponent::one) visit(term_model, energy.model);
 }
 
+// Pairs that neither touch nor touched at the last step: nothing is to be found for them. In a bed there is always one
+// that does; in a rain there hardly ever is.
+template <class I>
+PLATEN_INLINE bool all_apart(const Pairs<I>& p, double dt) {
+  const typename I::Real zero = I::set(0.0);
+  return !I::any(I::either(p.delta > zero, I::fma(p.v_n, I::set(dt), p.delta) > zero));
+}
+template <class I, SceneTraits scene>
+PLATEN_INLINE bool no_history(const PairBatch& b, std::int32_t k) {
+  using Real = typename I::Real;
+  Real size = (I::abs(I::load(b.tx + k)) + I::abs(I::load(b.ty + k))) + I::abs(I::load(b.tz + k));
+  if constexpr (scene.plasticity) size = size + I::abs(I::load(b.sp + k));
+  if constexpr (scene.exponent != Exponent::one) size = size + I::abs(I::load(b.k_t_last + k));
+  return !I::any(I::negate(I::set(0.0) >= size));
+}
+
 // Law of a chunk; whether every contribution is a number within its bound.
 template <class I, SceneTraits scene, bool exact>
 PLATEN_INLINE bool law_of_chunk(Chunk<scene>& chunk, const PairBatch& b, const LawConstants& c, std::int32_t start,
-                                int count, PairTotals& totals) {
+                                int count, std::uint64_t& close, PairTotals& totals) {
   using Real = typename I::Real;
   const Real zero = I::set(0.0);
   const Real force_bound2 = I::set(c.force.bound * c.force.bound), energy_bound = I::set(c.energy.bound);
@@ -322,6 +338,9 @@ PLATEN_INLINE bool law_of_chunk(Chunk<scene>& chunk, const PairBatch& b, const L
   int contacts = 0;
   for (int at = 0; at < count; at += I::width) {
     const Pairs<I> pairs = chunk.template take_pairs<I>(at);
+    if (all_apart<I>(pairs, c.dt) && no_history<I, scene>(b, start + at)) continue;
+    constexpr std::uint64_t lanes = (std::uint64_t{2} << (I::width - 1)) - 1;
+    close |= lanes << at;
     PairEnergies<I> energy;
     const PairForces<I> forces = pair_forces<I, scene, exact>(pairs, b, c, start + at, energy);
     chunk.template put_forces<I>(at, forces);
@@ -364,15 +383,16 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
   alignas(64) const double nothing[record_size] = {};
   for (std::int32_t start = 0; start < b.count; start += chunk_size) {
     const int count = start + chunk_size < b.count ? chunk_size : b.count - start;
+    std::uint64_t close = 0;  // bit by bit, the contacts of vectors that are not all apart
     if (c.width > 0.0)
       for (int at = 0; at < count; at += I::width)
         chunk.template put_pairs<I>(at, fetch_pairs<I, scene, exact, true>(b, c, start + at));
     else
       for (int at = 0; at < count; at += I::width)
         chunk.template put_pairs<I>(at, fetch_pairs<I, scene, exact, false>(b, c, start + at));
-    fine = law_of_chunk<typename Interleaved<I>::Type, scene, exact>(chunk, b, c, start, count, totals) && fine;
+    fine = law_of_chunk<typename Interleaved<I>::Type, scene, exact>(chunk, b, c, start, count, close, totals) && fine;
     for (int at = 0; at < count; at += I::width)
-      output_pairs<I, scene>(chunk, at, b, c, start + at, nothing, carried, owner);
+      if (close >> at & 1) output_pairs<I, scene>(chunk, at, b, c, start + at, nothing, carried, owner);
   }
   totals.out_of_range = totals.out_of_range || !fine;
 }
