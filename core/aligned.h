@@ -12,6 +12,8 @@
 #include <new>
 #include <type_traits>
 
+#include "core/huge_pool.h"
+
 namespace platen {
 
 // A growing array of plain numbers. Growing keeps the old content; new elements are zero.
@@ -28,10 +30,11 @@ class AlignedArray {
     swap(other);
     return *this;
   }
-  ~AlignedArray() { std::free(block_); }
+  ~AlignedArray() { release(); }
 
   void swap(AlignedArray& other) noexcept {
     std::swap(block_, other.block_);
+    std::swap(pooled_, other.pooled_);
     std::swap(data_, other.data_);
     std::swap(size_, other.size_);
     std::swap(capacity_, other.capacity_);
@@ -53,17 +56,23 @@ class AlignedArray {
     if (capacity <= capacity_) return;
     capacity = std::max(capacity, capacity_ + capacity_ / 4);
     const std::size_t bytes = capacity * sizeof(T);
-    const bool large = bytes >= huge_page;
-    const std::size_t alignment = large ? huge_page : 64;
-    const std::size_t stagger = large ? 64 * (next_start() % 61) : 0;
-    const std::size_t whole = (bytes + stagger + alignment - 1) / alignment * alignment;
-    void* block = std::aligned_alloc(alignment, whole);
-    if (block == nullptr) throw std::bad_alloc();
-    if (large) madvise(block, whole, MADV_HUGEPAGE);  // a wish: without huge pages everything still works
+    const bool large = bytes >= huge_page, pooled = pools && !large && bytes >= smallest_pooled;
+    void* block = nullptr;
+    std::size_t stagger = 0;
+    if (pooled) {
+      block = take_from_pool(bytes);
+    } else {
+      const std::size_t alignment = large ? huge_page : 64;
+      stagger = large ? 64 * (next_start() % 61) : 0;
+      const std::size_t whole = (bytes + stagger + alignment - 1) / alignment * alignment;
+      block = std::aligned_alloc(alignment, whole);
+      if (block == nullptr) throw std::bad_alloc();
+      if (large) madvise(block, whole, MADV_HUGEPAGE);  // a wish: without huge pages everything still works
+    }
     T* data = reinterpret_cast<T*>(static_cast<char*>(block) + stagger);
     std::copy(data_, data_ + size_, data);
-    std::free(block_);
-    block_ = block, data_ = data, capacity_ = capacity;
+    release();
+    block_ = block, data_ = data, capacity_ = capacity, pooled_ = pooled ? bytes : 0;
   }
 
   T* data() { return data_; }
@@ -79,13 +88,25 @@ class AlignedArray {
   const T* end() const { return data_ + size_; }
 
  private:
-  static constexpr std::size_t huge_page = std::size_t{1} << 21;
+  static constexpr std::size_t huge_page = std::size_t{1} << 21, smallest_pooled = 2048;
+#if defined(__SANITIZE_ADDRESS__)
+  static constexpr bool pools = false;  // AddressSanitizer guards blocks of its own
+#else
+  static constexpr bool pools = true;
+#endif
+  void release() {
+    if (pooled_ > 0)
+      give_to_pool(block_, pooled_);
+    else
+      std::free(block_);
+  }
   static unsigned next_start() {
     static std::atomic<unsigned> counter{0};
     return counter.fetch_add(7, std::memory_order_relaxed);
   }
 
   void* block_ = nullptr;
+  std::size_t pooled_ = 0;  // bytes asked from the pool; 0: from the heap
   T* data_ = nullptr;
   std::size_t size_ = 0, capacity_ = 0;
 };

@@ -310,37 +310,46 @@ PLATEN_INLINE void for_each_energy(const PairEnergies<I>& energy, const Visit& v
   if constexpr (scene.exponent != Exponent::one) visit(term_model, energy.model);
 }
 
-// Pairs that neither touch nor touched at the last step: nothing is to be found for them. In a bed there is always one
-// that does; in a rain there hardly ever is.
-template <class I>
-PLATEN_INLINE bool all_apart(const Pairs<I>& p, double dt) {
-  const typename I::Real zero = I::set(0.0);
-  return !I::any(I::either(p.delta > zero, I::fma(p.v_n, I::set(dt), p.delta) > zero));
-}
+// The vectors of a chunk in which something is to be found: where a pair touches, touched at the last step, or has a
+// history to forget. In a bed these are all, in a rain hardly any.
+struct ActiveVectors {
+  int at[chunk_size];
+  int count = 0;
+};
 template <class I, SceneTraits scene>
-PLATEN_INLINE bool no_history(const PairBatch& b, std::int32_t k) {
+PLATEN_INLINE ActiveVectors active_vectors(const Chunk<scene>& chunk, const PairBatch& b, double dt, std::int32_t start, int count) {
   using Real = typename I::Real;
-  Real size = (I::abs(I::load(b.tx + k)) + I::abs(I::load(b.ty + k))) + I::abs(I::load(b.tz + k));
-  if constexpr (scene.plasticity) size = size + I::abs(I::load(b.sp + k));
-  if constexpr (scene.exponent != Exponent::one) size = size + I::abs(I::load(b.k_t_last + k));
-  return !I::any(I::negate(I::set(0.0) >= size));
+  const Real zero = I::set(0.0);
+  ActiveVectors active;
+  for (int at = 0; at < count; at += I::width) {
+    const Real delta = I::load(chunk.delta + at), before = I::fma(I::load(chunk.v_n + at), I::set(dt), delta);
+    bool some = I::any(I::either(delta > zero, before > zero));
+    if (!some) {
+      const std::int32_t k = start + at;
+      Real size = (I::abs(I::load(b.tx + k)) + I::abs(I::load(b.ty + k))) + I::abs(I::load(b.tz + k));
+      if constexpr (scene.plasticity) size = size + I::abs(I::load(b.sp + k));
+      if constexpr (scene.exponent != Exponent::one) size = size + I::abs(I::load(b.k_t_last + k));
+      some = I::any(I::negate(zero >= size));
+    }
+    active.at[active.count] = at;
+    active.count += some;
+  }
+  return active;
 }
 
 // Law of a chunk; whether every contribution is a number within its bound.
 template <class I, SceneTraits scene, bool exact>
 PLATEN_INLINE bool law_of_chunk(Chunk<scene>& chunk, const PairBatch& b, const LawConstants& c, std::int32_t start,
-                                int count, std::uint64_t& close, PairTotals& totals) {
+                                const ActiveVectors& active, PairTotals& totals) {
   using Real = typename I::Real;
   const Real zero = I::set(0.0);
   const Real force_bound2 = I::set(c.force.bound * c.force.bound), energy_bound = I::set(c.energy.bound);
   PairEnergies<I> sums = {zero, zero, zero, zero, zero};
   auto wrong = zero > zero;
   int contacts = 0;
-  for (int at = 0; at < count; at += I::width) {
+  for (int m = 0; m < active.count; ++m) {
+    const int at = active.at[m];
     const Pairs<I> pairs = chunk.template take_pairs<I>(at);
-    if (all_apart<I>(pairs, c.dt) && no_history<I, scene>(b, start + at)) continue;
-    constexpr std::uint64_t lanes = (std::uint64_t{2} << (I::width - 1)) - 1;
-    close |= lanes << at;
     PairEnergies<I> energy;
     const PairForces<I> forces = pair_forces<I, scene, exact>(pairs, b, c, start + at, energy);
     chunk.template put_forces<I>(at, forces);
@@ -383,16 +392,18 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
   alignas(64) const double nothing[record_size] = {};
   for (std::int32_t start = 0; start < b.count; start += chunk_size) {
     const int count = start + chunk_size < b.count ? chunk_size : b.count - start;
-    std::uint64_t close = 0;  // bit by bit, the contacts of vectors that are not all apart
     if (c.width > 0.0)
       for (int at = 0; at < count; at += I::width)
         chunk.template put_pairs<I>(at, fetch_pairs<I, scene, exact, true>(b, c, start + at));
     else
       for (int at = 0; at < count; at += I::width)
         chunk.template put_pairs<I>(at, fetch_pairs<I, scene, exact, false>(b, c, start + at));
-    fine = law_of_chunk<typename Interleaved<I>::Type, scene, exact>(chunk, b, c, start, count, close, totals) && fine;
-    for (int at = 0; at < count; at += I::width)
-      if (close >> at & 1) output_pairs<I, scene>(chunk, at, b, c, start + at, nothing, carried, owner);
+    using Wide = typename Interleaved<I>::Type;
+    const ActiveVectors active = active_vectors<Wide, scene>(chunk, b, c.dt, start, count);
+    fine = law_of_chunk<Wide, scene, exact>(chunk, b, c, start, active, totals) && fine;
+    for (int m = 0; m < active.count; ++m)
+      for (int at = active.at[m]; at < active.at[m] + Wide::width; at += I::width)
+        output_pairs<I, scene>(chunk, at, b, c, start + at, nothing, carried, owner);
   }
   totals.out_of_range = totals.out_of_range || !fine;
 }

@@ -1,0 +1,16 @@
+// Memory on huge pages for arrays that are too small to have a page of their own.
+//
+// A bed has hundreds of lists of some ten kilobytes each. On pages of 4 KiB they take more of them than a processor
+// keeps translations for, and every pass over the bed pays for looking them up again, twice over in a virtual machine.
+#pragma once
+
+#include <cstddef>
+
+namespace platen {
+
+// A block of at least `bytes`, 64-byte aligned. Any thread may ask; memory that is given back is kept for others.
+// Throws std::bad_alloc.
+void* take_from_pool(std::size_t bytes);
+void give_to_pool(void* block, std::size_t bytes) noexcept;  // the same `bytes`
+
+}  // namespace platen
