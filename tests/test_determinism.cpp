@@ -157,7 +157,7 @@ TEST(Determinism, RebuildsAtAnyTime) {
   }
 }
 
-TEST(Determinism, FiftyRepetitionsGiveOneHash) {
+TEST(Determinism, TwoHundredRepetitionsGiveOneHash) {
   BedOptions o;
   o.nx = 7, o.ny = 6, o.nz = 6, o.speed = 1.0;
   for (const int threads : {2, 4}) {
@@ -165,7 +165,7 @@ TEST(Determinism, FiftyRepetitionsGiveOneHash) {
     engine.threads = threads, engine.batch = 16, engine.executor = Executor::flow_graph;
     engine.instruction_set = available_instruction_sets().back();
     std::uint64_t first = 0;
-    for (int k = 0; k < 50; ++k) {
+    for (int k = 0; k < 200; ++k) {
       engine.fused = k % 2 == 1;
       const Outcome r = run(scenes::bed(o, scenes::full_law(), engine), 100);
       if (k == 0) first = r.hash;
