@@ -4,6 +4,7 @@
 
 #include <cstring>
 
+#include "bench/harness.h"
 #include "core/float_mode.h"
 
 namespace platen::bench {
@@ -39,36 +40,52 @@ void ParallelForStep::merge(BatchCopy& b) {
     }
 }
 
+void ParallelForStep::integrate(int batch) {
+  const FloatMode mode;
+  BatchCopy& b = batches_[static_cast<std::size_t>(batch)];
+  if (!merged_) merge(b);
+  MotionTotals totals;
+  kernels_.motion(b.motion(state_), motion_, totals);
+}
+
+void ParallelForStep::contacts(int batch) {
+  const FloatMode mode;
+  BatchCopy& b = batches_[static_cast<std::size_t>(batch)];
+  std::memset(b.sum.data(), 0, b.sum.size() * sizeof(double));
+  PairTotals& totals = totals_[static_cast<std::size_t>(batch)];
+  totals.contacts = 0;
+  kernels_.contacts(b.pairs(state_), law_, totals);
+  for (PlateCopy& list : b.plates) {
+    Plane plane = plane_shape(list.plate);
+    plane.position = planes_[static_cast<std::size_t>(list.plate)].position_at(step_);
+    plane.velocity = planes_[static_cast<std::size_t>(list.plate)].velocity_at(step_);
+    PlateTotals plate_totals;
+    kernels_.plates(list.view(state_), plane, plate_law_, plate_totals);
+  }
+}
+
 void ParallelForStep::advance(int steps) {
   const int count = static_cast<int>(batches_.size());
   arena_.execute([&] {
     for (int step = 0; step < steps; ++step) {
-      tbb::parallel_for(0, count, [&](int k) {
-        const FloatMode mode;
-        BatchCopy& b = batches_[static_cast<std::size_t>(k)];
-        if (!merged_) merge(b);
-        MotionTotals totals;
-        kernels_.motion(b.motion(state_), motion_, totals);
-      });
+      tbb::parallel_for(0, count, [&](int k) { integrate(k); });
       merged_ = false;
       ++step_;
-      tbb::parallel_for(0, count, [&](int k) {
-        const FloatMode mode;
-        BatchCopy& b = batches_[static_cast<std::size_t>(k)];
-        std::memset(b.sum.data(), 0, b.sum.size() * sizeof(double));
-        PairTotals& totals = totals_[static_cast<std::size_t>(k)];
-        totals.contacts = 0;
-        kernels_.contacts(b.pairs(state_), law_, totals);
-        for (PlateCopy& list : b.plates) {
-          Plane plane = plane_shape(list.plate);
-          plane.position = planes_[static_cast<std::size_t>(list.plate)].position_at(step_);
-          plane.velocity = planes_[static_cast<std::size_t>(list.plate)].velocity_at(step_);
-          PlateTotals plate_totals;
-          kernels_.plates(list.view(state_), plane, plate_law_, plate_totals);
-        }
-      });
+      tbb::parallel_for(0, count, [&](int k) { contacts(k); });
     }
   });
+}
+
+std::vector<ParallelForStep::BatchTimes> ParallelForStep::times(int steps) {
+  const int count = static_cast<int>(batches_.size());
+  std::vector<BatchTimes> all(batches_.size());
+  for (int step = 0; step < steps; ++step) {
+    for (int k = 0; k < count; ++k) all[static_cast<std::size_t>(k)].integrate += seconds_of([&] { integrate(k); }) / steps;
+    merged_ = false;
+    ++step_;
+    for (int k = 0; k < count; ++k) all[static_cast<std::size_t>(k)].contacts += seconds_of([&] { contacts(k); }) / steps;
+  }
+  return all;
 }
 
 bool ParallelForStep::same_bits(const Simulation& sim) const {

@@ -16,11 +16,19 @@ class ParallelForStep {
 
   void advance(int steps);
 
+  // Mean times of a batch's two tasks over `steps` steps, all on this thread [s].
+  struct BatchTimes {
+    double integrate = 0.0, contacts = 0.0;
+  };
+  std::vector<BatchTimes> times(int steps);
+
   // Whether positions and velocities have the same bits as those of `sim`, which must not have sorted since.
   bool same_bits(const Simulation& sim) const;
 
  private:
   void merge(BatchCopy& b);
+  void integrate(int batch);
+  void contacts(int batch);
 
   StateCopy state_;
   std::vector<BatchCopy> batches_;

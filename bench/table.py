@@ -64,6 +64,13 @@ def make(folder):
             ("particles", "threads", "graph M/s", "graph, fused tasks", "parallel_for", "graph / parallel_for"),
             [(f"{r['particles']:,}", r["threads"], number(r["split"]), number(r["fused"]), number(r["rate"]), number(r["ratio"], 2))
              for r in rows]))
+    rows = rows_of(folder, "schedule")
+    if rows:
+        parts.append("### More cores: simulated, not measured\n\nThe real graph with task times measured on one core; shared caches and "
+                     "memory are not in it (`bench/step_schedule.cpp`).\n\n" + table(
+            ("particles", "workers", "batches", "us per task", "overhead of a task, us", "work over longest chain", "speed-up", "workers busy"),
+            [(f"{r['particles']:,}", r["workers"], r["batches"], number(r["task_us"]), number(r["overhead_us"], 2), number(r["bound"]),
+              number(r["speedup"]), number(r["busy"], 2)) for r in rows]))
     rows = rows_of(folder, "sets")
     if rows:
         last = rows[-1]["rate"]

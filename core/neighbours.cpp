@@ -154,6 +154,10 @@ void colour(std::vector<Batch>& batches) {
 
 }  // namespace
 
+int automatic_batch(std::int32_t particles, int threads) {
+  return std::clamp(particles / (16 * std::max(1, threads)) / padding * padding, 128, 1024);
+}
+
 int BatchOf::operator()(std::int32_t particle) const {
   return static_cast<int>(std::upper_bound(starts.begin(), starts.end(), particle) - starts.begin()) - 1;
 }

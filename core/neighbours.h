@@ -45,6 +45,9 @@ std::vector<std::int32_t> morton_order(const Particles& particles);
 std::vector<Batch> make_batches(const Particles& particles, const Domain& domain, const Margins& margins, int size,
                                 const ParallelFor& parallel);
 
+// Particles in a batch where nothing else is asked for: enough batches for all threads, none too small to be worth a task.
+int automatic_batch(std::int32_t particles, int threads);
+
 // Batch of a particle.
 struct BatchOf {
   std::vector<std::int32_t> starts;  // first particle of each batch, ascending

@@ -242,10 +242,9 @@ void Simulation::rebuild_with(const PairHistories& pairs) {
   const auto run = [this](int count, const std::function<void(int)>& body) { parallel(count, body); };
   particles_.permute(morton_order(particles_));
   choose_margins(true);
-  const int automatic = std::clamp(particles_.count / (16 * std::max(1, engine_.threads)) / padding * padding, 128, 1024);
   graph_.reset();
   table_.reset();
-  batches_ = make_batches(particles_, domain_, outer_, engine_.batch > 0 ? engine_.batch : automatic, run);
+  batches_ = make_batches(particles_, domain_, outer_, engine_.batch > 0 ? engine_.batch : automatic_batch(particles_.count, engine_.threads), run);
   fill_inner(batches_, particles_, domain_, inner_, keeps_k_t(), pairs, run);
   list_plates(batches_, particles_, planes_, step_, inner_, plate_gap_, plates, run);
   merged_.assign(batches_.size(), 1);

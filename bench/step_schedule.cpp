@@ -1,0 +1,117 @@
+// How the graph of tasks would run on more cores than this machine has. Simulated: the real tasks with the times that
+// each of them takes here on one core, dealt out to so many workers as soon as all that they wait for is done. Cores that
+// share caches and memory are slower than that, so this is a bound of what the graph allows, not a measurement.
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <chrono>
+#include <functional>
+#include <queue>
+
+#include "bench/parallel_for_step.h"
+#include "bench/step_modes.h"
+#include "core/step_graph.h"
+
+namespace platen::bench {
+
+namespace {
+
+struct Schedule {
+  double makespan = 0.0;  // [s]
+  double work = 0.0;      // sum of all tasks [s]
+  double longest = 0.0;   // longest chain of tasks that wait for each other [s]
+};
+
+// Whoever is free takes the first ready task in the order of the table.
+Schedule schedule(const TaskTable& table, const std::vector<double>& cost, int workers) {
+  const std::size_t count = table.tasks().size();
+  std::vector<std::int32_t> waits = table.predecessors();
+  std::vector<double> chain(count, 0.0);
+  std::priority_queue<std::int32_t, std::vector<std::int32_t>, std::greater<>> ready;
+  using Running = std::pair<double, std::int32_t>;  // when it ends, task
+  std::priority_queue<Running, std::vector<Running>, std::greater<>> running;
+  for (std::size_t t = 0; t < count; ++t)
+    if (waits[t] == 0) ready.push(static_cast<std::int32_t>(t));
+  Schedule result;
+  double now = 0.0;
+  while (!ready.empty() || !running.empty()) {
+    while (!ready.empty() && static_cast<int>(running.size()) < workers) {
+      const auto t = static_cast<std::size_t>(ready.top());
+      ready.pop();
+      running.push({now + cost[t], static_cast<std::int32_t>(t)});
+      result.work += cost[t];
+    }
+    const auto [end, task] = running.top();
+    running.pop();
+    now = end;
+    const auto t = static_cast<std::size_t>(task);
+    chain[t] += cost[t];
+    result.longest = std::max(result.longest, chain[t]);
+    for (const std::int32_t next : table.successors()[t]) {
+      chain[static_cast<std::size_t>(next)] = std::max(chain[static_cast<std::size_t>(next)], chain[t]);
+      if (--waits[static_cast<std::size_t>(next)] == 0) ready.push(next);
+    }
+  }
+  result.makespan = now;
+  return result;
+}
+
+// What a flow graph costs by itself, for one task [s].
+double overhead_of_a_task(const TaskTable& table) {
+  tbb::task_arena one(1);
+  double seconds = 0.0;
+  one.execute([&] {
+    FlowGraph graph(table, [](const Task&) {});
+    graph.run(table.steps());
+    seconds = seconds_of([&] { graph.run(table.steps()); });
+  });
+  return seconds / static_cast<double>(table.tasks().size());
+}
+
+}  // namespace
+
+void table_of_schedules(const StepOptions& o) {
+  Table table("Simulated schedule of the real graph, 32 steps long, with task times measured here on one core",
+              {{"particles", "particles", 10, 0},
+               {"workers", "workers", 8, 0},
+               {"batches", "batches", 8, 0},
+               {"task_us", "us/task", 9, 1},
+               {"overhead_us", "overhead", 9, 2},
+               {"bound", "work/chain", 11, 1},
+               {"speedup", "speed-up", 9, 2},
+               {"busy", "busy", 7, 2}});
+  for (const std::int64_t particles : o.particles.empty() ? std::vector<std::int64_t>{35000} : o.particles) {
+    const Bed bed = dense_bed(particles, o.beds);
+    const BenchScene scene = bench_scene("full");
+    for (const int workers : o.threads.empty() ? std::vector<int>{1, 2, 4, 8, 16, 32, 64} : o.threads) {
+      const InstructionSet set = o.sets.empty() ? available_instruction_sets().back() : o.sets.front();
+      BenchEngine engine = engine_of(o, set, 1);
+      if (engine.batch == 0) engine.batch = automatic_batch(static_cast<std::int32_t>(particles), workers);
+      const auto sim = make_simulation(bed, scene, engine);
+      sim->advance(64);
+      sim->rebuild_now();
+      ParallelForStep tasks(*sim, scene.law, scene.gravity, 1);
+      const std::vector<ParallelForStep::BatchTimes> times = tasks.times(40);
+      const TaskTable graph(sim->batches(), 32, false);
+      const double overhead = overhead_of_a_task(graph);
+      std::vector<double> cost;
+      for (const Task& task : graph.tasks()) {
+        const auto& t = times[static_cast<std::size_t>(task.batch)];
+        cost.push_back(overhead + (task.kind == TaskKind::contacts ? t.contacts : t.integrate));
+      }
+      const Schedule s = schedule(graph, cost, workers);
+      table.add({{"particles", particles},
+                 {"workers", workers},
+                 {"batches", sim->counters().batches},
+                 {"task_us", 1e6 * s.work / static_cast<double>(cost.size())},
+                 {"overhead_us", 1e6 * overhead},
+                 {"bound", s.work / s.longest},
+                 {"speedup", s.work / s.makespan},
+                 {"busy", s.work / s.makespan / workers},
+                 {"simulated", true}});
+    }
+  }
+  write_json(o.json, "schedule", table);
+}
+
+}  // namespace platen::bench
