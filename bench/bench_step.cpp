@@ -55,6 +55,7 @@ int main(int argc, char** argv) {
            {"executors", "flow graph against two parallel_for a step"},
            {"rain", "loose falling spheres, rebuilds included"},
            {"rebuilds", "the cost of making all lists anew"},
+           {"phases", "where the time of a step goes"},
            {"schedule", "the graph on more cores than there are, simulated from measured task times"},
            {"one", "blocks of one scene as one JSON line"},
            {"one-rain", "the same for rain"},
@@ -74,6 +75,7 @@ int main(int argc, char** argv) {
     if (mode == "executors" && !table_of_executors(options)) return 1;
     if (mode == "rain") table_of_rain(options);
     if (mode == "rebuilds") table_of_rebuilds(options);
+    if (mode == "phases") table_of_phases(options);
     if (mode == "schedule") table_of_schedules(options);
     if (mode == "one") one_block(options, false);
     if (mode == "one-rain") one_block(options, true);

@@ -88,6 +88,15 @@ std::vector<ParallelForStep::BatchTimes> ParallelForStep::times(int steps) {
   return all;
 }
 
+double ParallelForStep::bytes() const {
+  double all = 0.0;
+  for (const BatchCopy& b : batches_) {
+    all += static_cast<double>(b.list_bytes() + b.row_bytes() + b.sum_bytes());       // contacts
+    all += 8.0 * b.count * (9 + record_size + 1 + 2 * 9 + row_size);                  // owner's columns; integrate
+  }
+  return all;
+}
+
 bool ParallelForStep::same_bits(const Simulation& sim) const {
   const Particles& p = sim.state();
   const auto n = static_cast<std::size_t>(p.count);

@@ -21,6 +21,8 @@ class ParallelForStep {
     double integrate = 0.0, contacts = 0.0;
   };
   std::vector<BatchTimes> times(int steps);
+  // What a step must move at least: indices, history and sums of contacts, rows, columns [bytes].
+  double bytes() const;
 
   // Whether positions and velocities have the same bits as those of `sim`, which must not have sorted since.
   bool same_bits(const Simulation& sim) const;

@@ -42,6 +42,8 @@ bool table_of_executors(const StepOptions& options);
 void table_of_rain(const StepOptions& options);
 // Sorting and listing everything anew: ns per particle, by wall clock and by processor time of all threads.
 void table_of_rebuilds(const StepOptions& options);
+// Contacts, integration and the rest, and the bytes that they move.
+void table_of_phases(const StepOptions& options);
 // How the graph would run on more cores, simulated.
 void table_of_schedules(const StepOptions& options);
 // One scene on one bed, one JSON line on standard output: for scripts that run other programs in turn with it.

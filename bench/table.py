@@ -64,6 +64,12 @@ def make(folder):
             ("particles", "threads", "graph M/s", "graph, fused tasks", "parallel_for", "graph / parallel_for"),
             [(f"{r['particles']:,}", r["threads"], number(r["split"]), number(r["fused"]), number(r["rate"]), number(r["ratio"], 2))
              for r in rows]))
+    rows = rows_of(folder, "phases")
+    if rows:
+        parts.append("### Where the time of a step goes, one thread, ns per particle\n\n" + table(
+            ("particles", "contacts", "integrate", "lists and the saved copy", "whole step", "bytes moved", "GB/s", "ns if the third cache were all", "L2 / L3 GB/s"),
+            [(f"{r['particles']:,}", number(r["contacts"]), number(r["integrate"]), number(r["lists"]), number(r["whole"]),
+              number(r["bytes"], 0), number(r["GB/s"]), number(r["memory_bound"]), f"{number(r['l2'], 0)} / {number(r['l3'], 0)}") for r in rows]))
     rows = rows_of(folder, "schedule")
     if rows:
         parts.append("### More cores: simulated, not measured\n\nThe real graph with task times measured on one core; shared caches and "

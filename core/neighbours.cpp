@@ -155,7 +155,8 @@ void colour(std::vector<Batch>& batches) {
 }  // namespace
 
 int automatic_batch(std::int32_t particles, int threads) {
-  return std::clamp(particles / (16 * std::max(1, threads)) / padding * padding, 128, 1024);
+  // Three for each thread even the load out; a task is then long against what the graph takes for it.
+  return std::clamp(particles / (3 * std::max(1, threads)) / padding * padding, 256, 2048);
 }
 
 int BatchOf::operator()(std::int32_t particle) const {
