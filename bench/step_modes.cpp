@@ -14,13 +14,6 @@ namespace platen::bench {
 
 namespace {
 
-template <class T>
-std::vector<T> either(const std::vector<T>& given, std::vector<T> otherwise) {
-  return given.empty() ? std::move(otherwise) : given;
-}
-
-std::vector<InstructionSet> sets_of(const StepOptions& o) { return either(o.sets, {preferred_instruction_set()}); }
-
 std::int64_t steps_of(const StepOptions& o, std::size_t particles) {
   if (o.steps > 0) return o.steps;
   const double wanted = o.seconds * 15e6 / static_cast<double>(particles);

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bench/beds.h"
@@ -24,6 +25,13 @@ struct StepOptions {
   std::string json;
   std::filesystem::path beds;
 };
+
+// What was asked for, or else what a mode takes by itself.
+template <class T>
+std::vector<T> either(const std::vector<T>& given, std::vector<T> otherwise) {
+  return given.empty() ? std::move(otherwise) : given;
+}
+inline std::vector<InstructionSet> sets_of(const StepOptions& o) { return either(o.sets, {preferred_instruction_set()}); }
 
 BenchEngine engine_of(const StepOptions& options, InstructionSet set, int threads);
 

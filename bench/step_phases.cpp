@@ -1,5 +1,5 @@
 // Where the time of a step goes, and how far it is from what the memory allows.
-#include <numeric>
+#include <algorithm>
 
 #include "bench/parallel_for_step.h"
 #include "bench/reference_loops.h"
@@ -19,10 +19,10 @@ void table_of_phases(const StepOptions& o) {
                {"memory_bound", "L3 alone", 9, 1},
                {"l2", "L2 GB/s", 8, 0},
                {"l3", "L3 GB/s", 8, 0}});
-  for (const std::int64_t particles : o.particles.empty() ? std::vector<std::int64_t>{5000, 35000} : o.particles) {
+  for (const std::int64_t particles : either(o.particles, {5000, 35000})) {
     const Bed bed = dense_bed(particles, o.beds);
     const BenchScene scene = bench_scene("full");
-    const InstructionSet set = o.sets.empty() ? available_instruction_sets().back() : o.sets.front();
+    const InstructionSet set = sets_of(o).front();
     const auto sim = make_simulation(bed, scene, engine_of(o, set, 1));
     sim->advance(o.warm);
     const std::int64_t steps = o.steps > 0 ? o.steps : std::max<std::int64_t>(64, 10000000 / particles);

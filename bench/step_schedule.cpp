@@ -4,7 +4,6 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <chrono>
 #include <functional>
 #include <queue>
 
@@ -80,11 +79,11 @@ void table_of_schedules(const StepOptions& o) {
                {"bound", "work/chain", 11, 1},
                {"speedup", "speed-up", 9, 2},
                {"busy", "busy", 7, 2}});
-  for (const std::int64_t particles : o.particles.empty() ? std::vector<std::int64_t>{35000} : o.particles) {
+  for (const std::int64_t particles : either(o.particles, {35000})) {
     const Bed bed = dense_bed(particles, o.beds);
     const BenchScene scene = bench_scene("full");
-    for (const int workers : o.threads.empty() ? std::vector<int>{1, 2, 4, 8, 16, 32, 64} : o.threads) {
-      const InstructionSet set = o.sets.empty() ? available_instruction_sets().back() : o.sets.front();
+    for (const int workers : either(o.threads, {1, 2, 4, 8, 16, 32, 64})) {
+      const InstructionSet set = sets_of(o).front();
       BenchEngine engine = engine_of(o, set, 1);
       if (engine.batch == 0) engine.batch = automatic_batch(static_cast<std::int32_t>(particles), workers);
       const auto sim = make_simulation(bed, scene, engine);

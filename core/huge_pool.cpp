@@ -20,12 +20,14 @@ class HugePool {
   void* take(std::size_t bytes) {
     const std::size_t size = size_class(bytes);
     const std::lock_guard lock(mutex_);
-    std::vector<void*>& free = free_[size];
-    if (!free.empty()) {
-      void* block = free.back();
-      free.pop_back();
+    Class& of_size = free_[size];
+    if (!of_size.free.empty()) {
+      void* block = of_size.free.back();
+      of_size.free.pop_back();
       return block;
     }
+    // Room for every block of this size, so that giving one back never asks for memory.
+    if (of_size.free.capacity() <= of_size.blocks) of_size.free.reserve(2 * of_size.blocks + 1);
     if (left_ < size) {  // the rest of the old slab stays unused: less than one block
       const std::size_t slab = std::max(next_slab_, (size + huge_page - 1) / huge_page * huge_page);
       void* memory = std::aligned_alloc(huge_page, slab);
@@ -35,12 +37,12 @@ class HugePool {
       next_slab_ = std::min(2 * next_slab_, largest_slab);
     }
     char* block = at_;
-    at_ += size, left_ -= size;
+    at_ += size, left_ -= size, ++of_size.blocks;
     return block;
   }
   void give(void* block, std::size_t bytes) noexcept {
     const std::lock_guard lock(mutex_);
-    free_[size_class(bytes)].push_back(block);
+    free_[size_class(bytes)].free.push_back(block);
   }
 
  private:
@@ -53,8 +55,13 @@ class HugePool {
     return size % 4096 == 0 ? size + 64 : size;
   }
 
+  struct Class {
+    std::vector<void*> free;
+    std::size_t blocks = 0;  // free or in use
+  };
+
   std::mutex mutex_;
-  std::map<std::size_t, std::vector<void*>> free_;
+  std::map<std::size_t, Class> free_;
   char* at_ = nullptr;
   std::size_t left_ = 0, next_slab_ = huge_page;
 };

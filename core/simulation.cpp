@@ -359,7 +359,7 @@ void Simulation::advance(std::int64_t steps) {
     }
     // Did the lists hold? If not, a pair may have been missed, and a force out of range may be its consequence: from the
     // saved state once more with wider lists. Lists change no bits, so nobody sees it.
-    if (!(std::sqrt(pace) * (n * dt_) <= 1.0)) {
+    if (std::isfinite(pace) && std::sqrt(pace) * (n * dt_) > 1.0) {
       double fastest = 0.0;
       for (std::size_t k = 0; k < static_cast<std::size_t>(particles_.count); ++k) fastest = std::max(fastest, own_speed(k));
       const bool known = std::isfinite(fastest);
@@ -375,7 +375,7 @@ void Simulation::advance(std::int64_t steps) {
     }
     at_most = engine_.unroll;
     redo_margin_ = 0.0;
-    if (bad) {
+    if (bad || !std::isfinite(pace)) {
       if (n > 1) {  // once more step by step, so that the message tells where it began
         restore();
         one_by_one = true;

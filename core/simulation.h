@@ -149,6 +149,8 @@ class Simulation {
   double own_speed(std::size_t k) const;
   void choose_horizon();
   double widest_margin() const;
+  double least_margin(std::size_t k) const;
+  void check_speeds();
   bool choose_margins(bool fresh);
   int look(int wanted);
   void remember(AlignedArray<double>& reference, double (&drift)[3]);

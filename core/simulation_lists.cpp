@@ -1,7 +1,6 @@
 // Lists of a Simulation: when they are made anew and how wide, and the state to which a run of steps can go back.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "core/float_mode.h"
 #include "core/simulation_detail.h"
@@ -132,6 +131,19 @@ double Simulation::widest_margin() const {
   return std::min(wish, std::max(0.0, 0.25 * std::min(domain_.width, domain_.depth) - largest_radius_));
 }
 
+// Margin without which a sphere could not take a single step [m].
+double Simulation::least_margin(std::size_t k) const { return 1.01 * (caution * own_speed(k) + gravity_ * dt_) * dt_; }
+
+// Ends the run where a sphere is too fast for any list. Looked for before lists are touched: what a failure tells, and
+// what is still written after it, needs lists and particles that belong together.
+void Simulation::check_speeds() {
+  double needed = 0.0;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(particles_.count); ++k) needed = std::max(needed, least_margin(k));
+  if (needed > widest_margin())
+    fail("a sphere moves " + std::to_string(needed / largest_radius_) +
+         " radii in one step: more than lists can follow; use a smaller time step");
+}
+
 // Margins that hold for about a horizon, by the present speeds; false where the outer lists are too narrow for them.
 bool Simulation::choose_margins(bool fresh) {
   const auto n = static_cast<std::size_t>(particles_.count);
@@ -150,11 +162,9 @@ bool Simulation::choose_margins(bool fresh) {
   if (fresh) outer_.largest = 0.0;
   for (std::size_t k = 0; k < n; ++k) {
     const double now = caution * own_speed(k) * dt_, path = std::max(now, least_path);  // of one step
-    const double needed = 1.01 * (now + gravity_ * dt_ * dt_);
+    const double needed = least_margin(k);
     const double wish = engine_.inner_gap > 0.0 ? 0.5 * engine_.inner_gap : std::max(smallest_inner * R, horizon_ * path);
     double inner = std::min(std::max({wish, redo_margin_, needed}), most);
-    if (needed > most)
-      fail("a sphere moves " + std::to_string(path / R) + " radii in one step: more than lists can follow; use a smaller time step");
     if (fresh) {
       const double further = engine_.skin > 0.0 ? 0.5 * engine_.skin : inner + std::max(smallest_outer * R, outer_life * horizon_ * path);
       outer_.of[k] = std::clamp(further, inner, most);
@@ -189,7 +199,7 @@ int Simulation::look(int wanted) {
         continue;
       }
       const double left = inner_.of[k] - displacement(k, at_prune_, drift_at_prune_);
-      const double inverse = left > 0.0 ? 1.0 / left : std::numeric_limits<double>::infinity();
+      const double inverse = 1.0 / std::max(left, 1e-100);  // finite, so that no speed of 0 makes it not a number
       room_[k] = inverse * inverse;
       fastest = std::max(fastest, own_speed(k) * inverse);
       smallest = std::max(smallest, inverse);
@@ -212,6 +222,7 @@ int Simulation::prepare_lists(std::int64_t wanted) {
   mean_velocity();
   if (lists_valid_ && !lists_stale_)
     if (const int steps = look(n); steps >= std::min(n, worthwhile)) return steps;
+  check_speeds();
   choose_horizon();
   if (lists_valid_ && choose_margins(false))
     prune_lists();
@@ -244,7 +255,8 @@ void Simulation::rebuild_with(const PairHistories& pairs) {
   choose_margins(true);
   graph_.reset();
   table_.reset();
-  batches_ = make_batches(particles_, domain_, outer_, engine_.batch > 0 ? engine_.batch : automatic_batch(particles_.count, engine_.threads), run);
+  const int size = engine_.batch > 0 ? engine_.batch : automatic_batch(particles_.count, engine_.threads);
+  batches_ = make_batches(particles_, domain_, outer_, size, run);
   fill_inner(batches_, particles_, domain_, inner_, keeps_k_t(), pairs, run);
   list_plates(batches_, particles_, planes_, step_, inner_, plate_gap_, plates, run);
   merged_.assign(batches_.size(), 1);

@@ -82,7 +82,7 @@ struct Twice {
   static PLATEN_INLINE Record add(const Record& a, const Record& b) { return I::add(a, b); }
 };
 
-// What the law runs on. Measured: 10 % faster with AVX-512; AVX2 has too few registers for it [docs/performance.md].
+// What the law runs on. AVX2 has too few registers for two vectors at once [docs/decisions.md].
 template <class I>
 struct Interleaved {
   using Type = I;
