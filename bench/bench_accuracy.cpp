@@ -1,7 +1,8 @@
-// Work against precision: single collisions over the step, a bed's strain, porosity, contacts and strength over the step
-// and the speed of the plates, the energy ledger over the step.
+// Work against precision: single collisions over the step; a bed's strain, porosity, contacts, strength and energy ledger
+// over the step, the speed of the plates, the size of the spheres, and over what must not matter (skin, --reproducible).
 //
 //   bench_accuracy --case I -o accuracy-I        the same with II and III; --quick for a look
+//   bench_accuracy --case II -o accuracy-II --parts step,speed
 //
 // In the folder: collisions.csv, bulk.csv, accuracy.json, plots (gnuplot), recommendation.md, and the runs themselves; a
 // run that is there already is not repeated.
@@ -12,6 +13,7 @@
 
 #include "bench/accuracy/bulk.h"
 #include "bench/accuracy/collisions.h"
+#include "bench/accuracy/verdict.h"
 
 using namespace platen;
 using namespace platen::bench;
@@ -42,63 +44,36 @@ nlohmann::json collisions(const fs::path& folder, bool quick, std::string& repor
   return rows;
 }
 
-struct Setting {
-  std::string name, what;  // what: "step" or "speed"
-  double value = 0.0, dt = 0.0, speed = 0.0;
-};
-
-struct Quantity {
-  const char *key, *name;
-};
-constexpr Quantity quantities[] = {{"strain", "strain at the end of compression"}, {"porosity", "porosity there"},
-                                   {"coordination_number", "coordination number there"}, {"strength", "unconfined strength (Pa)"}};
-
-// Which of the values of `what` keep every quantity within the scatter between seeds, and how far off each is.
-std::string verdict(const std::string& what, const std::vector<Setting>& variants, std::map<std::string, std::vector<std::map<std::string, double>>>& figures,
-                    nlohmann::json& rows, bool crush) {
-  const auto column = [&](const std::string& name, const char* key) {
-    std::vector<double> x;
-    for (auto& run : figures[name]) x.push_back(run[key]);
-    return x;
+// Every setting of the parts asked for. Equal ones have equal names and are run once.
+std::vector<Setting> settings_of(const std::vector<std::string>& parts, const BulkSize& size, int seeds) {
+  std::vector<Setting> settings;
+  const auto add = [&](const char* part, double value, double share, double speed) -> Setting& {
+    Setting v{part, fmt::format("dt{:g}-v{:g}", share, 1e3 * speed), value, share, speed};
+    v.seeds = seeds;
+    settings.push_back(v);
+    return settings.back();
   };
-  std::string table = what == "step" ? "| dt / dt_crit |" : "| plate speed (mm/s) |";
-  for (const Quantity& q : quantities)
-    if (crush || std::string(q.key) != "strength") table += fmt::format(" {} |", q.name);
-  table += " ledger residual / dissipated | wall time (s) | within the scatter |\n|" + std::string(crush ? "---|---|---|---|---|---|---|---|" : "---|---|---|---|---|---|---|") + "\n";
-  const Setting* reference = nullptr;
-  double best = 0.0;
-  bool so_far = true;
-  for (const Setting& v : variants) {
-    if (v.what != what) continue;
-    if (!reference) reference = &v;
-    table += fmt::format("| {:g} |", what == "step" ? v.value : 1e3 * v.value);
-    bool good = true;
-    for (const Quantity& q : quantities) {
-      if (!crush && std::string(q.key) == "strength") continue;
-      const std::vector<double> x = column(v.name, q.key), x0 = column(reference->name, q.key);
-      const Difference d = paired(x, x0);
-      const double spread = scatter(x0);
-      double mean = 0.0;
-      int n = 0;
-      for (const double value : x0)
-        if (std::isfinite(value)) mean += value, ++n;
-      mean /= n;
-      if (&v == reference) table += fmt::format(" {:.5g}, seeds ±{:.2g} |", mean, spread);
-      else table += fmt::format(" {:+.2g} ± {:.2g} |", d.mean, d.error);
-      // No more than the scatter, its own uncertainty included; a run that failed is not good.
-      if (&v != reference && !(std::fabs(d.mean) + d.error <= spread && d.pairs == static_cast<int>(x.size()))) good = false;
-      rows.push_back({{"what", what}, {"value", v.value}, {"quantity", q.key}, {"mean", mean}, {"difference", d.mean}, {"standard_error", d.error}, {"pairs", d.pairs}, {"seed_scatter", spread}});
+  const auto asked = [&](const char* part) { return std::find(parts.begin(), parts.end(), part) != parts.end(); };
+  if (asked("step"))
+    for (const double share : size.shares) add("step", share, share, size.speed);
+  if (asked("speed"))
+    for (const double speed : size.speeds) add("speed", speed, size.share, speed);
+  if (asked("same")) {
+    add("same", 0, size.share, size.speed);
+    for (const double skin : {0.1, 0.4, 0.8}) {  // of R
+      Setting& v = add("same", skin, size.share, size.speed);
+      v.skin = skin * scale_radius, v.seeds = 2, v.name += fmt::format("-skin{:g}", skin);
     }
-    double energy = 0.0, seconds = 0.0;
-    for (auto& run : figures[v.name]) energy += run["energy"] / static_cast<double>(figures[v.name].size()), seconds += run["seconds"] / static_cast<double>(figures[v.name].size());
-    rows.push_back({{"what", what}, {"value", v.value}, {"quantity", "energy"}, {"mean", energy}, {"seconds", seconds}});
-    so_far = so_far && good;
-    if (so_far) best = v.value;
-    table += fmt::format(" {:.1e} | {:.1f} | {} |\n", energy, seconds, &v == reference ? "reference" : good ? "yes" : "no");
+    Setting& v = add("same", -1, size.share, size.speed);
+    v.reproducible = true, v.name += "-reproducible";
   }
-  table += what == "step" ? fmt::format("\nLargest step within the scatter between seeds: **{:g} dt_crit**.\n\n", best)
-                          : fmt::format("\nFastest plates within the scatter between seeds: **{:g} mm/s**.\n\n", 1e3 * best);
-  return table;
+  if (asked("scale"))
+    for (const double radius : size.radii) {
+      Setting& v = add("scale", radius, size.share, size.speed);
+      v.radius = radius, v.seeds = radius == scale_radius ? seeds : size.scale_seeds;
+      if (radius != scale_radius) v.name += fmt::format("-R{:g}mm", 1e3 * radius);
+    }
+  return settings;
 }
 
 void plot(const fs::path& folder, bool crush) {
@@ -109,15 +84,24 @@ void plot(const fs::path& folder, bool crush) {
         "set output 'collisions-step.svg'\nset xlabel 'dt / dt_crit'\n"
         "plot for [k=0:3] 'collisions.csv' index k using 2:3 skip (k == 0 ? 1 : 0) with linespoints title word('elastic damped plastic cohesive', k+1), x*x title 'second order' dashtype 2 lc 'grey', 0.1*x title 'first order' dashtype 3 lc 'grey'\n"
         "unset logscale y\nset format y '%g'\n";
-  for (const std::string what : {"step", "speed"})
+  for (const std::string what : {"step", "speed", "scale"})
     for (const Quantity& q : quantities) {
       if (!crush && std::string(q.key) == "strength") continue;
       const std::string rows = fmt::format("'bulk.csv' using (strcol(1) eq '{}' && strcol(4) eq '{}' ? column(2) : NaN)", what, q.key);
       gp << fmt::format("set output 'bulk-{}-{}.svg'\nset xlabel '{}'\nset ylabel '{}'\n"
                         "plot {}:5:6 skip 1 with yerrorlines title 'difference to the reference, standard error', {}:7 skip 1 with lines lc 'grey' title 'scatter between seeds', "
                         "{}:(-column(7)) skip 1 with lines lc 'grey' notitle\n",
-                        what, q.key, what == "step" ? "dt / dt_crit" : "plate speed (m/s)", q.name, rows, rows, rows);
+                        what, q.key, what == "step" ? "dt / dt_crit" : what == "speed" ? "plate speed (m/s)" : "R (m)", q.name, rows, rows, rows);
     }
+  // Work against precision: every setting of a part is a point of its line.
+  for (const Quantity& q : quantities) {
+    if (!crush && std::string(q.key) == "strength") continue;
+    const auto rows = [&](const char* what) { return fmt::format("'bulk.csv' using (strcol(1) eq '{}' && strcol(4) eq '{}' && column(5) != 0 ? column(8) : NaN)", what, q.key); };
+    gp << fmt::format("set logscale y\nset format y '%.0e'\nset output 'work-{}.svg'\nset xlabel 'wall time (s)'\nset ylabel '|difference| of {}'\n"
+                      "plot {}:(abs(column(5))):(2*column(6)) skip 1 with yerrorlines title 'step, twice the standard error', {}:(abs(column(5))):(2*column(6)) skip 1 with yerrorlines title 'plate speed', "
+                      "{}:7 skip 1 with lines lc 'grey' title 'scatter between seeds', {}:(column(7)/2) skip 1 with lines dashtype 2 lc 'grey' title 'half of it'\nunset logscale y\nset format y '%g'\n",
+                      q.key, q.name, rows("step"), rows("speed"), rows("step"), rows("step"));
+  }
   gp << "set logscale y\nset format y '%.0e'\nset output 'energy.svg'\nset xlabel 'dt / dt_crit'\nset ylabel 'ledger residual / dissipated energy'\n"
         "plot 'bulk.csv' using (strcol(1) eq 'step' && strcol(4) eq 'energy' ? column(2) : NaN):3 skip 1 with linespoints notitle\n";
   gp.close();
@@ -133,50 +117,75 @@ int main(int argc, char** argv) {
   fs::path folder;
   bool quick = false;
   int processes = 1, seeds = 0;
+  std::vector<std::string> parts = {"collisions", "step", "speed", "same", "scale"};
   app.add_option("--case", name, "I, II or III of the paper, at R = 3.75 mm")->check(CLI::IsMember({"I", "II", "III"}));
   app.add_option("-o", folder, "folder")->required();
   app.add_flag("--quick", quick, "140 spheres, fast plates, three seeds: a look, not a result");
   app.add_option("--jobs", processes, "runs side by side")->check(CLI::Range(1, 1024));
-  app.add_option("--seeds", seeds, "beds (default 6; 3 with --quick)")->check(CLI::Range(2, 100));
+  app.add_option("--seeds", seeds, "beds (default 8; 3 with --quick)")->check(CLI::Range(2, 100));
+  app.add_option("--parts", parts, "of the measurement: collisions, step, speed, same, scale (all)")->delimiter(',')->check(CLI::IsMember({"collisions", "step", "speed", "same", "scale"}));
   CLI11_PARSE(app, argc, argv);
   try {
     fs::create_directories(folder);
     const BulkCase b = bulk_case(name);
-    BulkSize size = bulk_size(quick);
+    const BulkSize size = bulk_size(quick);
     const bool crush = b.crush;
+    const int beds = seeds > 0 ? seeds : size.seeds;
     std::string report = fmt::format("# Accuracy, case {}\n\n{}{} spheres of R = 3.75 mm in a periodic box of {:g} x {:g} mm, {} seeds.\n\n", name,
-                                     quick ? "A quick look, not a result. " : "", size.count, 1e3 * size.side, 1e3 * size.side, seeds > 0 ? seeds : size.seeds);
-    const nlohmann::json collision_rows = collisions(folder, quick, report);
+                                     quick ? "A quick look, not a result. " : "", size.count, 1e3 * size.side, 1e3 * size.side, beds);
+    nlohmann::json collision_rows;
+    if (std::find(parts.begin(), parts.end(), "collisions") != parts.end()) collision_rows = collisions(folder, quick, report);
 
     // dt_crit as the program takes it before contacts exist.
-    const Case probe = parse_case(bed_job(b, size, 1, 1e-6).text, "probe", folder);
-    const FirstStep first = first_step(probe);
-    const double dt_crit = first.limits.dt_crit;
-    const int beds = seeds > 0 ? seeds : size.seeds;
+    const double dt_crit = first_step(parse_case(bed_job(b, size, 1, scale_radius, 1e-6).text, "probe", folder)).limits.dt_crit;
+    const std::vector<Setting> settings = settings_of(parts, size, beds);
+    std::map<std::pair<double, int>, Job> bed_jobs;
+    std::map<std::string, Job> run_list;
     std::vector<Job> jobs;
-    for (int seed = 1; seed <= beds; ++seed) jobs.push_back(bed_job(b, size, seed, dt_crit));
-    std::fprintf(stderr, "%d beds\n", beds);
-    run_jobs(jobs, folder, processes);
-    for (int seed = 1; seed <= beds; ++seed) write_bed(folder / bed_name(seed), folder / (bed_name(seed) + ".csv"));
-
-    std::vector<Setting> variants;
-    for (const double share : size.shares) variants.push_back({fmt::format("step-{:g}", share), "step", share, share * dt_crit, size.speed});
-    for (const double speed : size.speeds) variants.push_back({fmt::format("speed-{:g}", speed), "speed", speed, size.share_of_speeds * dt_crit, speed});
-    jobs.clear();
-    for (const Setting& v : variants)
-      for (int seed = 1; seed <= beds; ++seed) jobs.push_back(variant_job(b, size, seed, v.name, v.dt, v.speed));
+    for (const Setting& v : settings)
+      for (int seed = 1; seed <= v.seeds; ++seed) {
+        bed_jobs.emplace(std::pair(v.radius, seed), bed_job(b, size, seed, v.radius, dt_crit));
+        const Job job = variant_job(b, size, seed, v, dt_crit);
+        if (run_list.emplace(job.name, job).second) jobs.push_back(job);
+      }
+    std::vector<Job> first;
+    for (const auto& [key, job] : bed_jobs) first.push_back(job);
+    std::fprintf(stderr, "%zu beds\n", first.size());
+    run_jobs(first, folder, processes);
+    for (const Job& bed : first) write_bed(folder / bed.name, folder / (bed.name + ".csv"));
     std::fprintf(stderr, "%zu runs\n", jobs.size());
     run_jobs(jobs, folder, processes);
 
-    std::map<std::string, std::vector<std::map<std::string, double>>> figures;
-    for (const Setting& v : variants)
-      for (int seed = 1; seed <= beds; ++seed) figures[v.name].push_back(bulk_figures(folder / fmt::format("{}-{}", v.name, seed)));
+    Figures figures;
+    for (const Setting& v : settings) {
+      auto& runs = figures[v.name];
+      for (int seed = static_cast<int>(runs.size()) + 1; seed <= v.seeds; ++seed) runs.push_back(bulk_figures(folder / fmt::format("{}-{}", v.name, seed)));
+    }
     nlohmann::json rows = nlohmann::json::array();
-    report += fmt::format("\n## The bed over the step\n\ndt_crit = {:.4g} s (before contacts exist), plates at {:g} mm/s, {:g} kPa. Differences to the smallest step of the same seed: mean ± standard error.\n\n",
-                          dt_crit, 1e3 * size.speed, 1e-3 * size.stress);
-    report += verdict("step", variants, figures, rows, crush);
-    report += fmt::format("## The bed over the speed of the plates\n\nAt {:g} dt_crit. Differences to the slowest plates of the same seed.\n\n", size.share_of_speeds);
-    report += verdict("speed", variants, figures, rows, crush);
+    std::vector<Verdict> all;
+    const auto part = [&](const std::string& what, const std::string& title, const std::string& head, bool pairs, const auto& value) {
+      std::vector<const Setting*> chosen;
+      for (const Setting& v : settings)
+        if (v.part == what) chosen.push_back(&v);
+      if (chosen.empty()) return;
+      const std::vector<Verdict> verdicts = judge(chosen, *chosen.front(), figures, crush, pairs);
+      report += "## " + title + "\n\n" + verdict_table(head, verdicts, *chosen.front(), figures, value) + "\n";
+      for (const Verdict& v : verdicts)
+        rows.push_back({{"what", what}, {"setting", v.setting->name}, {"value", v.setting->value}, {"quantity", v.quantity}, {"mean", v.mean}, {"difference", v.difference},
+                        {"standard_error", v.error}, {"seed_scatter", v.scatter}, {"seconds", seconds_of(figures, *v.setting).mean}, {"complete", v.complete}});
+      for (const Setting* v : chosen)
+        rows.push_back({{"what", what}, {"setting", v->name}, {"value", v->value}, {"quantity", "energy"}, {"mean", moments(column(figures, v->name, "energy")).mean}, {"seconds", seconds_of(figures, *v).mean}});
+      // The slowest plates are no candidate: their own step's error is not in their difference of 0.
+      for (const Verdict& v : verdicts)
+        if (what == "step" || (what == "speed" && v.setting != chosen.front())) all.push_back(v);
+    };
+    report += fmt::format("\ndt_crit = {:.4g} s (before contacts exist), {:g} kPa. Differences: mean ± standard error. The bound is |mean| + 2 standard errors of the quantity that is farthest off, "
+                          "over the scatter between seeds of the reference.\n\n", dt_crit, 1e-3 * size.stress);
+    part("step", fmt::format("The bed over the step, plates at {:g} mm/s", 1e3 * size.speed), "dt / dt_crit", true, [](const Setting& v) { return fmt::format("{:g}", v.value); });
+    part("speed", fmt::format("The bed over the speed of the plates, at {:g} dt_crit", size.share), "plate speed (mm/s)", true, [](const Setting& v) { return fmt::format("{:g}", 1e3 * v.value); });
+    part("same", "What must not matter", "setting", true, [](const Setting& v) { return v.reproducible ? std::string("--reproducible") : v.skin > 0 ? fmt::format("skin {:g} R", v.value) : std::string("default"); });
+    part("scale", "The bed over the size of the spheres, stiffness ~ R, f0 ~ R^2", "R (mm)", false, [](const Setting& v) { return fmt::format("{:g}", 1e3 * v.value); });
+    if (!all.empty()) report += "## If you accept ... the fastest setting measured is\n\n" + recommendation_table(all, figures, crush);
 
     std::ofstream csv(folder / "bulk.csv");
     csv << "what,value,mean,quantity,difference,standard error,seed scatter,seconds\n";

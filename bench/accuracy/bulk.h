@@ -14,65 +14,98 @@
 
 namespace platen::bench {
 
+constexpr double scale_radius = 3.75e-3;  // of all parts but the particle scale [m]
+
 struct BulkCase {
-  std::string name, law;  // case I, II or III of [Thakur2016] at R = 3.75 mm: k1, k2, k_adh ~ R, f0 ~ R^2
+  std::string name;
+  double f0 = 0.0, k_adh = 0.0;            // at scale_radius [N, N/m]
   bool vibrate = false, crush = true;
 };
 
+// Case I, II or III of [Thakur2016].
 inline BulkCase bulk_case(const std::string& name) {
-  const std::string common = "k1 = 7500.0\nk2 = 37500.0\nrestitution = 0.4\nfriction = 0.5\nrolling_friction = 0.001\n";
-  if (name == "I") return {name, common, true, false};
-  if (name == "II") return {name, common + "f0 = -0.9\n", false, true};
-  if (name == "III") return {name, common + "k_adh = 7500.0\n", false, true};
+  if (name == "I") return {name, 0.0, 0.0, true, false};
+  if (name == "II") return {name, -0.9, 0.0, false, true};
+  if (name == "III") return {name, 0.0, 7500.0, false, true};
   throw std::invalid_argument("no case " + name + "; there are I, II, III");
 }
 
 struct BulkSize {
-  int count = 1700;
+  int count = 1700;            // at scale_radius
   double side = 0.05;          // of the square box [m]
-  double speed = 0.01;         // of plates in variants of the step [m/s]
+  double speed = 0.01;         // of plates in all parts but their speed [m/s]
   double stress = 40e3;        // [Pa]
-  int seeds = 6;
-  std::vector<double> shares;  // of dt_crit, smallest first: that is the reference
+  int seeds = 8, scale_seeds = 4;
+  std::vector<double> shares;  // steps, of dt_crit, smallest first: that is the reference
   std::vector<double> speeds;  // [m/s], slowest first: the reference
-  double share_of_speeds = 0.2;
+  std::vector<double> radii;   // [m], finest first: the reference
+  double share = 0.4;          // step of all parts but the step, of dt_crit
   double bed_share = 0.1, vibration = 1.0;  // [s]
+  bool strict = true;          // settle by the experiment's own criterion
 };
 
 inline BulkSize bulk_size(bool quick) {
-  if (!quick) return {1700, 0.05, 0.01, 40e3, 6, {0.025, 0.05, 0.1, 0.2, 0.3, 0.4}, {0.0025, 0.005, 0.01, 0.02, 0.04}, 0.2, 0.1, 1.0};
-  return {140, 0.02, 0.2, 20e3, 3, {0.1, 0.2, 0.4}, {0.1, 0.4}, 0.2, 0.2, 0.05};
+  BulkSize s;
+  s.shares = {0.0625, 0.125, 0.2, 0.3, 0.4, 0.5, 0.6, 0.75, 0.9};
+  s.speeds = {0.0025, 0.005, 0.01, 0.02, 0.04, 0.08};
+  s.radii = {2e-3, 2.5e-3, 3e-3, 3.75e-3, 5e-3};
+  if (!quick) return s;
+  s.count = 140, s.side = 0.02, s.speed = 0.2, s.stress = 20e3, s.seeds = 3, s.scale_seeds = 2;
+  s.shares = {0.1, 0.2, 0.4}, s.speeds = {0.1, 0.4}, s.radii = {3e-3, 3.75e-3};
+  s.bed_share = 0.2, s.vibration = 0.05, s.strict = false;
+  return s;
 }
 
-inline std::string bulk_text(const BulkCase& b, const BulkSize& s, int seed, double dt, const std::string& particles) {
+// One run of the bed: everything that the parts of the measurement change.
+struct Setting {
+  std::string part, name;      // "step", "speed", "same", "scale"; the name begins the run folder's
+  double value = 0.0;          // of what the part varies
+  double share = 0.0, speed = 0.0, radius = scale_radius;
+  double skin = 0.0;           // 0: chosen by the engine [m]
+  bool reproducible = false;
+  int seeds = 0;
+};
+
+inline int count_of(const BulkSize& s, double radius) { return static_cast<int>(std::lround(s.count * std::pow(scale_radius / radius, 3))); }
+
+// dt_crit grows with R when the stiffness does.
+inline std::string bulk_text(const BulkCase& b, const BulkSize& s, int seed, double radius, double dt, const std::string& particles, double skin = 0.0) {
+  const double scale = radius / scale_radius;
+  const double volume = s.count * 4.0 / 3.0 * 3.14159265358979 * std::pow(scale_radius, 3);
   return fmt::format(
-      "[case]\ntitle = \"accuracy, case {}\"\nseed = {}\n[particles]\ndensity = 2000.0\n{}[particles.law]\n{}[box]\nwidth = {}\ndepth = {}\n"
-      "height = {}\n[time]\nstep = {}\n[output]\nseries = 5e-3\nframes = \"off\"\ncontacts = false\n",
-      b.name, seed, particles, b.law, s.side, s.side, 1.2 * s.count * 2.209e-7 / (0.5 * s.side * s.side), dt);
+             "[case]\ntitle = \"accuracy, case {}\"\nseed = {}\n[particles]\ndensity = 2000.0\nradius = {}\n{}[particles.law]\n"
+             "k1 = {}\nk2 = {}\nk_adh = {}\nf0 = {}\nrestitution = 0.4\nfriction = 0.5\nrolling_friction = 0.001\n",
+             b.name, seed, radius, particles, 7500.0 * scale, 37500.0 * scale, b.k_adh * scale, b.f0 * scale * scale) +
+         fmt::format("[box]\nwidth = {}\ndepth = {}\nheight = {}\n[time]\nstep = {}\n[output]\nseries = 5e-3\nframes = \"off\"\ncontacts = false\n",
+                     s.side, s.side, 1.2 * volume / (0.5 * s.side * s.side), dt) +
+         (skin > 0.0 ? fmt::format("[engine]\nskin = {}\n", skin) : "");
 }
 
 inline std::string settle_text(bool strict) {
   return strict ? "[[stage]]\nkind = \"settle\"\n" : "[[stage]]\nkind = \"settle\"\nuntil = { kinetic_to_potential = 1e-4, window = \"20 ms\" }\n";
 }
 
-inline std::string bed_name(int seed) { return fmt::format("bed-{}", seed); }
-
-inline Job bed_job(const BulkCase& b, const BulkSize& s, int seed, double dt_crit) {
-  std::string text = bulk_text(b, s, seed, s.bed_share * dt_crit, fmt::format("radius = 3.75e-3\ncount = {}\n", s.count));
-  text += "[[stage]]\nkind = \"fill\"\n";
-  if (b.vibrate) text += fmt::format("[[stage]]\nkind = \"vibrate\"\nfrequency = 60.0\namplitude = 1.5e-3\nduration = {}\n", s.vibration);
-  return {bed_name(seed), text + settle_text(s.seeds > 3)};
+inline std::string bed_name(double radius, int seed) {
+  return radius == scale_radius ? fmt::format("bed-{}", seed) : fmt::format("bed-{:g}mm-{}", 1e3 * radius, seed);
 }
 
-inline Job variant_job(const BulkCase& b, const BulkSize& s, int seed, const std::string& name, double dt, double speed) {
-  std::string text = bulk_text(b, s, seed, dt, fmt::format("radius = 3.75e-3\nfile = \"{}.csv\"\n", bed_name(seed)));
-  text += settle_text(s.seeds > 3);
-  text += fmt::format("[[stage]]\nkind = \"compress\"\nspeed = {}\nstart_gap = 1e-4\nuntil = {{ stress = {} }}\n", speed, s.stress);
+// dt_crit: at scale_radius.
+inline Job bed_job(const BulkCase& b, const BulkSize& s, int seed, double radius, double dt_crit) {
+  std::string text = bulk_text(b, s, seed, radius, s.bed_share * dt_crit * radius / scale_radius, fmt::format("count = {}\n", count_of(s, radius)));
+  text += "[[stage]]\nkind = \"fill\"\n";
+  if (b.vibrate) text += fmt::format("[[stage]]\nkind = \"vibrate\"\nfrequency = 60.0\namplitude = 1.5e-3\nduration = {}\n", s.vibration);
+  return {bed_name(radius, seed), text + settle_text(s.strict)};
+}
+
+inline Job variant_job(const BulkCase& b, const BulkSize& s, int seed, const Setting& v, double dt_crit) {
+  std::string text = bulk_text(b, s, seed, v.radius, v.share * dt_crit * v.radius / scale_radius, fmt::format("file = \"{}.csv\"\n", bed_name(v.radius, seed)), v.skin);
+  text += settle_text(s.strict);
+  text += fmt::format("[[stage]]\nkind = \"compress\"\nspeed = {}\nstart_gap = 1e-4\nuntil = {{ stress = {} }}\n", v.speed, s.stress);
   if (b.crush)
     text += fmt::format("[[stage]]\nkind = \"unload\"\nspeed = {}\n[[stage]]\nkind = \"release\"\n{}"
                         "[[stage]]\nkind = \"crush\"\nspeed = {}\nstart_gap = 1e-4\nuntil = {{ strain = 0.2, drop = 0.2 }}\n",
-                        speed, s.seeds > 3 ? "" : "until = { kinetic_to_potential = 1e-4, window = \"20 ms\" }\n", speed);
-  return {fmt::format("{}-{}", name, seed), text};
+                        v.speed, s.strict ? "" : "until = { kinetic_to_potential = 1e-4, window = \"20 ms\" }\n", v.speed);
+  return {fmt::format("{}-{}", v.name, seed), text, v.reproducible};
 }
 
 // The settled bed as a particle file: positions and radii; its contacts start fresh in every variant alike.
@@ -106,32 +139,6 @@ inline std::map<std::string, double> bulk_figures(const std::filesystem::path& r
     if (stage.at("kind") == "crush") r["strength"] = stage.value("strength", std::nan(""));
   }
   return r;
-}
-
-struct Difference {
-  double mean = 0.0, error = 0.0;  // of the pairs: mean and standard error
-  int pairs = 0;
-};
-
-inline Difference paired(const std::vector<double>& a, const std::vector<double>& reference) {
-  Difference d;
-  double sum = 0.0, squares = 0.0;
-  for (std::size_t k = 0; k < a.size(); ++k) {
-    const double x = a[k] - reference[k];
-    if (!std::isfinite(x)) continue;
-    sum += x, squares += x * x, ++d.pairs;
-  }
-  d.mean = d.pairs > 0 ? sum / d.pairs : std::nan("");
-  d.error = d.pairs > 1 ? std::sqrt(std::max(0.0, squares - sum * d.mean) / (d.pairs - 1) / d.pairs) : std::nan("");
-  return d;
-}
-
-inline double scatter(const std::vector<double>& x) {  // standard deviation between seeds
-  double sum = 0.0, squares = 0.0;
-  int n = 0;
-  for (const double v : x)
-    if (std::isfinite(v)) sum += v, squares += v * v, ++n;
-  return n > 1 ? std::sqrt(std::max(0.0, squares - sum * sum / n) / (n - 1)) : std::nan("");
 }
 
 }  // namespace platen::bench

@@ -19,6 +19,7 @@ namespace platen::bench {
 struct Job {
   std::string name;                // of its folder below `folder`
   std::string text;                // the case
+  bool reproducible = false;       // as platen run --reproducible
 };
 
 inline nlohmann::json summary_of(const std::filesystem::path& run) {
@@ -38,7 +39,9 @@ inline void run_jobs(const std::vector<Job>& jobs, const std::filesystem::path& 
     try {
       const Case c = parse_case(job.text, job.name, folder);
       RunFolder run = RunFolder::create(folder / job.name, c.text, true);
-      const RunOutcome outcome = run_experiment(c, run, {});
+      RunOptions options;
+      options.reproducible = job.reproducible;
+      const RunOutcome outcome = run_experiment(c, run, options);
       std::ofstream(folder / job.name / "bench-case.toml") << job.text;
       if (outcome.exit_code != exit_done) std::fprintf(stderr, "%s: exit %d: %s\n", job.name.c_str(), outcome.exit_code, outcome.message.c_str());
       return outcome.exit_code;
