@@ -5,6 +5,8 @@
 //   contacts/<isa>/<scene>/<list>    one pass over the pairs of the list; time step 0, so the state stays what it is
 //   motion/<isa>/<spheres>/<list>    kick, drift, rows
 //   plates/<isa>                     the spheres near the bottom plate
+//   unguarded/..., guarded/...       the first two without and with the guards (forces, overlaps, energies, velocities in
+//                                    range): their cost is the difference
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
@@ -16,6 +18,7 @@
 #include "bench/beds.h"
 #include "bench/list_copies.h"
 #include "bench/reference_loops.h"
+#include "bench/unguarded.h"
 #include "core/float_mode.h"
 
 using namespace platen;
@@ -76,8 +79,9 @@ void finish(benchmark::State& state, double items, double bytes, const char* ite
   state.counters[fmt::format("{}s", item)] = items;
 }
 
-void contacts(benchmark::State& state, InstructionSet set, const BenchScene& scene, List list) {
+void contacts(benchmark::State& state, InstructionSet set, const BenchScene& scene, List list, decltype(KernelTable::contacts) kernel) {
   Lists& l = lists(set, scene, list);
+  if (kernel == nullptr) kernel = l.sim->kernels().contacts;
   const FloatMode mode;
   LawConstants law = l.sim->law();
   law.dt = 0.0;
@@ -90,7 +94,7 @@ void contacts(benchmark::State& state, InstructionSet set, const BenchScene& sce
     for (BatchCopy& b : l.batches) {
       std::memset(b.sum.data(), 0, b.sum.size() * sizeof(double));  // part of a pass: core does it too
       totals.contacts = 0;
-      l.sim->kernels().contacts(b.pairs(l.state), law, totals);
+      kernel(b.pairs(l.state), law, totals);
       touching += totals.contacts;
     }
     benchmark::ClobberMemory();
@@ -100,15 +104,16 @@ void contacts(benchmark::State& state, InstructionSet set, const BenchScene& sce
   state.counters["listed/contact"] = static_cast<double>(l.used) / static_cast<double>(touching);
 }
 
-void motion(benchmark::State& state, InstructionSet set, const BenchScene& scene, List list) {
+void motion(benchmark::State& state, InstructionSet set, const BenchScene& scene, List list, decltype(KernelTable::motion) kernel) {
   Lists& l = lists(set, scene, list);
+  if (kernel == nullptr) kernel = l.sim->kernels().motion;
   const FloatMode mode;
   // Forces stay those of the lists; without kick and drift nothing runs away however often this is repeated.
   MotionConstants c = motion_constants(*l.sim, scene.law, scene.gravity);
   c.kick = c.drift = 0.0;
   MotionTotals totals;
   for (auto _ : state) {
-    for (BatchCopy& b : l.batches) l.sim->kernels().motion(b.motion(l.state), c, totals);
+    for (BatchCopy& b : l.batches) kernel(b.motion(l.state), c, totals);
     benchmark::ClobberMemory();
   }
   if (totals.out_of_range) state.SkipWithError("velocities out of range");
@@ -149,14 +154,21 @@ void add_all() {
         if (list != List::l2 && name != "full" && name != "linear") continue;  // the cache matters once
         benchmark::RegisterBenchmark(
             fmt::format("contacts/{}/{}/{}", to_string(set), name, list_names[static_cast<int>(list)]).c_str(),
-            contacts, set, scene, list);
+            contacts, set, scene, list, nullptr);
       }
     for (const List list : {List::l1, List::l2, List::l3})
       for (const char* name : {"full", "unequal_radii"})
         benchmark::RegisterBenchmark(
             fmt::format("motion/{}/{}/{}", to_string(set), name, list_names[static_cast<int>(list)]).c_str(), motion,
-            set, bench_scene(name), list);
+            set, bench_scene(name), list, nullptr);
     benchmark::RegisterBenchmark(fmt::format("plates/{}", to_string(set)).c_str(), plates, set);
+    if (const UnguardedKernels bare = unguarded_kernels(set); bare.contacts != nullptr) {
+      const BenchScene full = bench_scene("full");
+      benchmark::RegisterBenchmark(fmt::format("guarded/contacts/{}/L1", to_string(set)).c_str(), contacts, set, full, List::l1, nullptr);
+      benchmark::RegisterBenchmark(fmt::format("unguarded/contacts/{}/L1", to_string(set)).c_str(), contacts, set, full, List::l1, bare.contacts);
+      benchmark::RegisterBenchmark(fmt::format("guarded/motion/{}/L1", to_string(set)).c_str(), motion, set, full, List::l1, nullptr);
+      benchmark::RegisterBenchmark(fmt::format("unguarded/motion/{}/L1", to_string(set)).c_str(), motion, set, full, List::l1, bare.motion);
+    }
   }
 }
 

@@ -9,13 +9,13 @@
 
 namespace platen {
 
-template <class I, bool equal_spheres, bool rolling, bool energy>
+template <class I, bool equal_spheres, bool rolling, bool energy, bool guarded = true>
 void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals& totals) noexcept {
   using Real = typename I::Real;
   const Real zero = I::set(0.0), kick = I::set(c.kick), drift = I::set(c.drift);
   Real largest = zero;
   Real rolled = zero;
-  bool strange = false;
+  Real squares = zero;  // of all velocities: not a number where one is none
   for (std::int32_t k = 0; k < b.count; k += I::width) {
     typename I::Record records[I::width];
     for (int lane = 0; lane < I::width; ++lane)
@@ -47,7 +47,6 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
         const Real lost = (I::set(0.2) * m) * dot(u - slowed, u_before + slowed);
         const Real magic = I::set(c.energy.magic);
         rolled = rolled + ((lost + magic) - magic);
-        strange = strange || I::any(I::negate(I::abs(lost) < I::set(c.energy.bound)));
       }
       u = slowed;
     }
@@ -77,13 +76,17 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
     const Vec3<I> excess = {v.x - I::set(c.mean_x), v.y - I::set(c.mean_y), v.z - I::set(c.mean_z)};
     const Real speed2 = dot(excess, excess);
     largest = I::max(largest, speed2 * I::load(b.inverse_room2 + k));
-    strange = strange || I::any(I::negate(speed2 + dot(u, u) < I::set(0x1p60)));
+    if constexpr (guarded) squares = squares + (speed2 + dot(u, u));
   }
   const double pace = I::largest(largest);
   totals.largest_pace = totals.largest_pace > pace ? totals.largest_pace : pace;
-  if constexpr (energy && rolling)
-    totals.rolling += static_cast<std::int64_t>(I::sum(rolled) * c.energy.inverse);
-  totals.out_of_range = totals.out_of_range || strange;
+  if constexpr (guarded) totals.out_of_range = totals.out_of_range || I::any(I::negate(squares < I::set(0x1p60)));
+  if constexpr (energy && rolling) {
+    const double total = I::sum(rolled);
+    // Beyond this bound the sum is not exact.
+    if constexpr (guarded) totals.out_of_range = totals.out_of_range || !(total < chunk_size / 2 * c.energy.bound && total > -(chunk_size / 2 * c.energy.bound));
+    totals.rolling += static_cast<std::int64_t>(total * c.energy.inverse);
+  }
 }
 
 }  // namespace platen
