@@ -124,12 +124,21 @@ class Trials {
       t.z_top *= 1.5;
       trials_.push_back(std::move(t));
     }
-    Trial rest = bed("long rest", "cohesive");
-    rest.steps = 10 * sizes_.steps, rest.z_top = 0.0;
-    trials_.push_back(rest);
-    rest = bed("long rest", "cohesionless", [](PairLaw& law) { law.k_adh = law.f0 = 0.0; });
-    rest.steps = 10 * sizes_.steps, rest.z_top = 0.0;
-    trials_.push_back(std::move(rest));
+    // From two spheres for 10^8 steps to 10^5 for 10^4: what creeps shows with time, what adds up shows with numbers.
+    struct Rest {
+      int nx, ny, nz;
+      std::int64_t steps;
+    };
+    for (const Rest& r : {Rest{2, 1, 1, 100'000'000}, Rest{3, 4, 2, 100'000'000}, Rest{10, 10, 10, 1'000'000}, Rest{47, 47, 47, 10'000}})
+      for (const bool cohesive : {true, false}) {
+        if (!sizes_.large && r.nx > 10) continue;
+        Trial rest = bed("long rest", fmt::format("{} spheres, {}", r.nx * r.ny * r.nz, cohesive ? "cohesive" : "cohesionless"),
+                         [&](PairLaw& law) { if (!cohesive) law.k_adh = law.f0 = 0.0; },
+                         [&](scenes::BedOptions& o) { o.nx = r.nx, o.ny = r.ny, o.nz = r.nz, o.periodic = r.ny > 1; });
+        rest.steps = sizes_.large ? r.steps : std::min<std::int64_t>(r.steps / 100, 10'000);
+        rest.look_every = std::max<std::int64_t>(250, rest.steps / 400), rest.z_top = 0.0;
+        trials_.push_back(std::move(rest));
+      }
   }
 
   void sizes_and_overlaps() {

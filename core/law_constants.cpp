@@ -17,6 +17,8 @@ LawConstants pair_constants(const PairLaw& law) {
   c.sp_lower = 1.0 - c.k1 / c.k2;
   c.sp_upper = 1.0 + c.k_adh / c.k2;
   c.mu = law.friction, c.mu_r = law.rolling_friction;
+  if (law.friction_limit == FrictionLimit::adhesive) c.limit_k = c.k_adh, c.limit_f = 0.0;
+  else c.limit_k = 0.0, c.limit_f = c.f0;
   c.ratio = law.tangential_ratio;
   c.k_t = c.ratio * c.k1;
   c.half_over_k_t = c.k_t > 0.0 ? 0.5 / c.k_t : 0.0;

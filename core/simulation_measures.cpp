@@ -49,6 +49,7 @@ double normal_energy(const LawConstants& c, double delta, double sp) {
 
 struct PairSums {
   FixedSum elastic, adhesion, tangential;
+  double deepest = 0.0;  // overlap over diameter
   explicit PairSums(double unit) : elastic(unit), adhesion(unit), tangential(unit) {}
 };
 
@@ -56,6 +57,7 @@ void add_pairs(const Batch& b, const Particles& p, const Domain& domain, const L
   for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k) {
     const PairState s = pair_state(p, domain, b.i[k], b.j[k]);
     if (!(s.delta > 0.0)) continue;
+    sums.deepest = std::max(sums.deepest, s.delta / (2.0 * std::min(s.R_i, s.R_j)));
     sums.elastic.add(normal_energy(c, s.delta, b.sp[k]));
     sums.adhesion.add(c.f0 * s.delta);
     const double k_t = c.ratio * loading_slope(c, s.delta);
@@ -109,9 +111,9 @@ Measures Simulation::measure(bool stored_energies) {
   ensure_forces();
   struct Part {
     FixedSum kinetic, rolled, potential, plate_energy, support, top, bottom, weight;
-    double highest = -std::numeric_limits<double>::infinity(), volume = 0.0;
+    double highest = -std::numeric_limits<double>::infinity(), farthest = 0.0;
     PairSums pairs;
-    bool touches = false;
+    bool touches = false, lost = false;  // lost: a position is not a number
     Part(double energy, double force)
         : kinetic(energy), rolled(energy), potential(energy), plate_energy(energy), support(force), top(force), bottom(force),
           weight(force), pairs(energy) {}
@@ -144,8 +146,10 @@ Measures Simulation::measure(bool stored_energies) {
       part.potential.add(m * gravity_ * p.z[k]);
       part.weight.add(m * gravity_);
       part.highest = std::max(part.highest, p.z[k] + R);
+      part.farthest = std::max({part.farthest, std::fabs(p.x[k]), std::fabs(p.y[k]), std::fabs(p.z[k])});
+      part.lost = part.lost || !std::isfinite(p.x[k] + p.y[k] + p.z[k]);
     }
-    if (with_ledger) add_pairs(b, p, domain_, law_, part.pairs);
+    if (stored_energies) add_pairs(b, p, domain_, law_, part.pairs);
     for (int plate = 0; plate < plate_count; ++plate) {
       const PlateList& list = b.plates[plate];
       if (with_ledger) add_plate_energy(list, plate_law_, part.plate_energy, p);
@@ -164,6 +168,9 @@ Measures Simulation::measure(bool stored_energies) {
     all.pairs.elastic.add(part.pairs.elastic), all.pairs.adhesion.add(part.pairs.adhesion);
     all.pairs.tangential.add(part.pairs.tangential);
     all.highest = std::max(all.highest, part.highest);
+    all.farthest = std::max(all.farthest, part.farthest);
+    all.lost = all.lost || part.lost;
+    all.pairs.deepest = std::max(all.pairs.deepest, part.pairs.deepest);
     all.touches = all.touches || part.touches;
   }
 
@@ -173,6 +180,8 @@ Measures Simulation::measure(bool stored_energies) {
   const double z_bottom = bottom ? plane_position(plate_bottom) : 0.0;
   const double z_top = top ? plane_position(plate_top) : all.highest;
   r.highest_point = all.highest;
+  r.farthest = all.lost ? std::numeric_limits<double>::quiet_NaN() : all.farthest;
+  r.deepest_overlap = all.pairs.deepest;
   r.top_touches = all.touches;
   r.height = (top && (all.touches || z_top < all.highest) ? z_top : all.highest) - z_bottom;
   r.weight = all.weight.value();
@@ -381,7 +390,7 @@ StepLimits Simulation::step_limits() {
 void Simulation::fail(const std::string& what) {
   std::string text = what + " at step " + std::to_string(step_) + " (t = " + std::to_string(time()) + " s)";
   int named = 0;
-  char line[256];
+  char line[400];
   const auto id = [this](std::int32_t k) {
     return static_cast<long long>(particles_.id_of_rank[static_cast<std::size_t>(particles_.rank[static_cast<std::size_t>(k)])]);
   };
@@ -402,9 +411,13 @@ void Simulation::fail(const std::string& what) {
       const double ratio = s.delta / std::min(s.R_i, s.R_j);
       if (!(ratio > 0.5) || ratio < deepest) continue;
       deepest = ratio;
-      std::snprintf(line, sizeof line, "; spheres %lld at (%g, %g, %g) m and %lld overlap by %.2f R", id(b.i[k]),
-                    particles_.x[static_cast<std::size_t>(b.i[k])], particles_.y[static_cast<std::size_t>(b.i[k])],
-                    particles_.z[static_cast<std::size_t>(b.i[k])], id(b.j[k]), ratio);
+      const auto i = static_cast<std::size_t>(b.i[k]), j = static_cast<std::size_t>(b.j[k]);
+      const double approach = (particles_.vx[j] - particles_.vx[i]) * s.n[0] + (particles_.vy[j] - particles_.vy[i]) * s.n[1] +
+                              (particles_.vz[j] - particles_.vz[i]) * s.n[2];
+      const double force = law_.f0 + law_.k2 * (overlap_power(law_, s.delta) - b.sp[k]);
+      std::snprintf(line, sizeof line, "; spheres %lld at (%g, %g, %g) m and %lld overlap by %.2f R (plastic %.2f R), approach at %g m/s, push with %g N",
+                    id(b.i[k]), particles_.x[i], particles_.y[i], particles_.z[i], id(b.j[k]), ratio,
+                    overlap_root(law_, b.sp[k]) / std::min(s.R_i, s.R_j), approach, force);
       text += line;
       ++named;
     }

@@ -3,7 +3,7 @@
 //   s = delta^n;  s_p = plastic overlap to the power n, the history
 //   s_p  <- clamp(s_p, (1 - k1/k2) s, (1 + k_adh/k2) s)       loading and adhesive branches [Eq. 2, A2, A3]
 //   f_hys = f0 + k2 (s - s_p)                                  [Eq. 2]
-//   limit = mu |k2 (s - s_p) + k_adh s|                        [Eq. 9, 10, A11]
+//   limit = mu |k2 (s - s_p) + k_adh s|                        [Eq. 9, 10, A11]; or mu |f_hys|, where a case asks for it
 //   K1    = n k1 delta^(n-1);  k_t = ratio K1                  [A8]
 //   beta_n^2 = 4 z (n+1)/(2n) m* K1;  beta_t^2 = ratio beta_n^2   [Eq. 4, 7, A8]
 #pragma once
@@ -19,7 +19,7 @@ template <class I>
 struct NormalResponse {
   typename I::Real sp;       // s_p after the step [m^n]
   typename I::Real f_hys;    // spring force, positive repels [N]
-  typename I::Real height;   // of f_hys above the adhesive branch: k2 (s - s_p) + k_adh s [N]
+  typename I::Real height;   // what friction is limited by: f_hys above the adhesive branch, k2 (s - s_p) + k_adh s [N]
 };
 
 template <class I>
@@ -65,7 +65,7 @@ PLATEN_INLINE NormalResponse<I> normal_response(typename I::Real s, typename I::
   Real f_hys = elastic, height = elastic;
   if constexpr (scene.adhesion) {
     f_hys = elastic + I::set(c.f0);
-    height = elastic + I::set(c.k_adh) * s;
+    height = (elastic + I::set(c.limit_f)) + I::set(c.limit_k) * s;
   }
   return {sp, f_hys, height};
 }

@@ -10,6 +10,12 @@ enum class RollingModel {
   relative   // both bodies against their relative angular velocity; equal and opposite torques
 };
 
+// What the Coulomb limit between spheres is mu times of [A11 in docs/laws.md].
+enum class FrictionLimit {
+  adhesive,  // the height of the spring force above the adhesive branch (the paper's Eq. 10)
+  normal     // the spring force: adhesion does not help friction
+};
+
 // Edinburgh elasto-plastic adhesive law between spheres [Thakur2016, Eq. 1-11].
 struct PairLaw {
   double k1 = 0.0;                      // loading stiffness [N/m^n]
@@ -22,6 +28,7 @@ struct PairLaw {
   double friction = 0.0;                // mu [-]
   double rolling_friction = 0.0;        // mu_r [-]
   RollingModel rolling_model = RollingModel::absolute;
+  FrictionLimit friction_limit = FrictionLimit::adhesive;
 };
 
 // Hertz-Mindlin between a sphere and a plane (plate or wall), total form [EDEM, A16 and A17 in docs/laws.md].

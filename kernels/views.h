@@ -41,6 +41,7 @@ struct LawConstants {
   double sp_lower;           // 1 - k1/k2:    s_p = sp_lower s while loading
   double sp_upper;           // 1 + k_adh/k2: s_p = sp_upper s on the adhesive branch
   double mu;
+  double limit_k, limit_f;   // Coulomb limit mu |k2 (s - s_p) + limit_k s + limit_f|: k_adh and 0 [Eq. 10], or 0 and f0
   double mu_r;
   double k_t;                // n = 1: tangential_ratio k1
   double half_over_k_t;      // n = 1: 1/(2 k_t)

@@ -84,6 +84,9 @@ void read_law(TableReader& law, const ParticleSpec& particles, PairLaw& out) {
   std::size_t model = 0;
   law.word("rolling_model", {"absolute", "relative"}, Need::optional, model);
   out.rolling_model = model == 0 ? RollingModel::absolute : RollingModel::relative;
+  std::size_t limit = 0;
+  law.word("friction_limit", {"adhesive", "normal"}, Need::optional, limit);
+  out.friction_limit = limit == 0 ? FrictionLimit::adhesive : FrictionLimit::normal;
   law.refuse_unknown("particles.law");
 }
 

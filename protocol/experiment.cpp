@@ -29,6 +29,7 @@ class Experiment {
     try {
       sim_ = make_simulation(c_, options_.threads, options_.reproducible);
       describe_run();
+      farthest_allowed_ = 1000.0 * size_of_space();
       for (std::size_t k = 0; k < c_.stages.size(); ++k) {
         const End end = run_stage(k);
         if (end == End::goal_missed) {
@@ -119,7 +120,9 @@ class Experiment {
   }
 
   void sample(std::size_t stage, double speed) {
-    current_.last = row_of(sim_->measure(), speed);
+    const Measures m = sim_->measure();
+    if (m.deepest_overlap > 0.25) warn("an overlap above a quarter of the diameter: the law is meant for small ones; stiffer spheres or less load help");
+    current_.last = row_of(m, speed);
     folder_.append(current_.last, static_cast<int>(stage));
   }
 
@@ -268,12 +271,41 @@ class Experiment {
   // Things that must not go unnoticed although every number is still finite.
   void guard(const Measures& m) {
     if (!std::isfinite(m.kinetic_energy) || !std::isfinite(m.potential_energy))
-      throw RunError(fmt::format("energy is not a number at step {}", m.step));
+      throw RunError(fmt::format("energy is not a number at step {}{}; a smaller time step or lower speeds help", m.step, farthest_sphere()));
+    if (!(m.farthest <= farthest_allowed_))
+      throw RunError(fmt::format("a sphere is lost at step {} (t = {:.6g} s){}: {}; plates, walls or periodic sides keep spheres in, a smaller time step or lower speeds keep them slow",
+                                 m.step, m.time, farthest_sphere(),
+                                 std::isnan(m.farthest) ? std::string("its position is not a number") : fmt::format("farther out than 1000 times the box, {:.4g} m", farthest_allowed_)));
     const bool quasi_static = current_.kind == StageKind::compress || current_.kind == StageKind::crush;
     if (quasi_static && m.stress_top > 1e3) {
       const double I = row_of(m, c_.stages[closed_.size()].speed).inertial_number;
       if (I > 1e-3) warn("inertial number above 1e-3 at more than 1 kPa: not quasi-static");
     }
+  }
+
+  // Of the box, or of the space that the spheres take at the start where that is larger [m].
+  double size_of_space() const {
+    const Particles& p = sim_->state();
+    double size = std::max({c_.box.width, c_.box.depth, c_.box.height, 2.0 * sim_->largest_radius()});
+    for (std::size_t k = 0; k < static_cast<std::size_t>(p.count); ++k) size = std::max({size, std::fabs(p.x[k]), std::fabs(p.y[k]), std::fabs(p.z[k])});
+    return size;
+  }
+
+  // The sphere that is not anywhere or farthest out, for messages.
+  std::string farthest_sphere() const {
+    const Particles& p = sim_->state();
+    const std::int32_t* found = nullptr;
+    double most = -1.0;
+    for (const std::int32_t& place : p.place) {
+      const auto k = static_cast<std::size_t>(place);
+      const double sum = std::fabs(p.x[k]) + std::fabs(p.y[k]) + std::fabs(p.z[k]);
+      const double far = std::isfinite(sum) ? sum : std::numeric_limits<double>::infinity();
+      if (far > most) most = far, found = &place;
+    }
+    if (!found) return "";
+    const auto k = static_cast<std::size_t>(*found);
+    return fmt::format("; sphere {} at ({:g}, {:g}, {:g}) m moves at ({:g}, {:g}, {:g}) m/s", p.id_of_rank[static_cast<std::size_t>(found - p.place.data())],
+                       p.x[k], p.y[k], p.z[k], p.vx[k], p.vy[k], p.vz[k]);
   }
 
   void show_progress(std::size_t index, const Stand& stand, const std::optional<std::int64_t>& exact, double stage_begin) {
@@ -310,6 +342,7 @@ class Experiment {
   StageResult current_;
   bool stage_open_ = false;
   std::optional<double> strain_zero_height_;
+  double farthest_allowed_ = std::numeric_limits<double>::infinity();  // of any coordinate [m]
   double looked_stress_ = 0.0, looked_contacts_ = 0.0;  // largest at looks at the limits since the last regular one
   double last_progress_ = 0.0;
   std::int64_t progress_step_ = 0;

@@ -41,6 +41,7 @@ struct EepaLaw {
   double n = 1.0;                         // exponent [-]
   double e = 1.0, mu = 0.0, mu_r = 0.0;   // [-]
   double kt_ratio = 2.0 / 7.0;            // kt / K1 [-]
+  bool plain_limit = false;               // mu |f_hys| in place of Eq. 10
   bool rolling_relative = false;          // against the relative spin instead of each body's own [A12]
 };
 
@@ -103,7 +104,7 @@ inline EepaNormal eepa_normal(const EepaLaw& law, EepaContact& c, double delta) 
     r.f_hys = law.f0 + k2 * (s - c.sp);
   }
   r.plastic = std::max(r.plastic, 0.0);  // an entry point found by rounding may lie just behind the present one
-  r.limit = open ? 0.0 : law.mu * std::abs(r.f_hys + kadh * s - law.f0);
+  r.limit = open ? 0.0 : law.mu * std::abs(law.plain_limit ? r.f_hys : r.f_hys + kadh * s - law.f0);
   c.touching = !open;
   c.delta = open ? 0.0 : delta;
   return r;

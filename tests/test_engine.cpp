@@ -19,7 +19,7 @@ reference::Bed reference_of(const SimulationSetup& s, double z_top, double top_v
   reference::Bed bed;
   bed.pair_law = {s.pair.k1, s.pair.k2, s.pair.k_adh, s.pair.f0, s.pair.exponent, s.pair.restitution, s.pair.friction,
                   s.pair.rolling_friction, s.pair.tangential_ratio,
-                  s.pair.rolling_model == RollingModel::relative};
+                  s.pair.friction_limit == FrictionLimit::normal, s.pair.rolling_model == RollingModel::relative};
   bed.plate_law = {s.plate.particle_young_modulus, s.plate.particle_poisson_ratio, s.plate.young_modulus,
                    s.plate.poisson_ratio, s.plate.restitution, s.plate.friction, s.plate.rolling_friction};
   bed.g = s.gravity;
@@ -55,6 +55,9 @@ std::vector<Variant> variants() {
   PairLaw soft = full;
   soft.exponent = 0.8, soft.k1 = 1e3, soft.k2 = 4e3, soft.k_adh = 500;
   list.push_back({"exponent_0.8", soft, {}});
+  PairLaw plain_limit = full;
+  plain_limit.friction_limit = FrictionLimit::normal;
+  list.push_back({"plain_limit", plain_limit, {}});
   PairLaw relative = full;
   relative.rolling_model = RollingModel::relative, relative.rolling_friction = 0.05;
   list.push_back({"relative_rolling", relative, wide});

@@ -69,6 +69,13 @@ TEST(LawCommand, FrictionLimitIsTheHeightAboveTheAdhesiveBranch) {
   }
 }
 
+TEST(LawCommand, FrictionLimitOfTheSpringForceAlone) {
+  PairLaw law = sample_law(1.5);
+  law.friction_limit = FrictionLimit::normal;
+  for (const LawRow& row : drive_pair(law, cycle_overlaps(law, 1e-4)))
+    EXPECT_NEAR(row.friction_limit, row.overlap > 0.0 ? law.friction * std::fabs(row.f_hys) : 0.0, 1e-15) << row.overlap;
+}
+
 TEST(LawCommand, BranchIsJudgedBeforeTheHistoryMoves) {
   // From the adhesive branch back up: elastic at once, because the history has followed the way down.
   const auto rows = drive_pair(sample_law(), {1e-4, 0.3e-4, 0.31e-4});

@@ -61,6 +61,7 @@ void judge_figures_12_14(Judge& judge);
 void judge_quasi_static(Judge& judge);
 void judge_similarity_2(Judge& judge);
 void judge_similarity_3(Judge& judge);
+void judge_friction_limit(Judge& judge);
 void judge_cross_checks(Judge& judge);
 void judge_scans(Judge& judge);
 

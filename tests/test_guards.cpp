@@ -1,0 +1,151 @@
+// Faults put into a running bed must end the run within one look, and the message must name the step, the spheres and
+// what to change.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/experiment_case.h"
+#include "tests/scenes.h"
+
+namespace platen {
+namespace {
+
+using namespace test;
+
+constexpr double inf = std::numeric_limits<double>::infinity(), nan = std::numeric_limits<double>::quiet_NaN();
+
+// What the engine says when `fault` has been put into a bed at step 20; "" where it goes on as if nothing were wrong.
+// A running Simulation cannot be written to from outside; only this test does so.
+template <class Fault>
+std::string said_after(InstructionSet set, int threads, const Fault& fault, const PairLaw& law = scenes::full_law()) {
+  EngineOptions engine;
+  engine.instruction_set = set, engine.threads = threads, engine.batch = 16;
+  scenes::BedOptions options;
+  Simulation sim(scenes::bed(options, law, engine));
+  sim.set_time_step(2e-6);
+  scenes::add_plates(sim, options.nz * options.spacing * options.R + 0.02 * options.R, -0.1);
+  sim.advance(20);
+  const Particles& state = sim.state();
+  std::int32_t k = 0;  // the sphere of id 10 + 3 * 21, in the middle of the bed
+  while (state.id_of_rank[static_cast<std::size_t>(state.rank[static_cast<std::size_t>(k)])] != 73) ++k;
+  fault(const_cast<Particles&>(state), const_cast<std::vector<Batch>&>(sim.batches()), static_cast<std::size_t>(k));
+  try {
+    sim.advance(32);
+  } catch (const RunError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+void expect_named(const std::string& said, const std::string& what) {
+  EXPECT_NE(said.find(what), std::string::npos) << said;
+  const auto at = said.find("at step ");
+  ASSERT_NE(at, std::string::npos) << said;
+  const int step = std::stoi(said.substr(at + 8));
+  EXPECT_GE(step, 20) << said;
+  EXPECT_LE(step, 52) << said;
+  EXPECT_NE(said.find("73 at ("), std::string::npos) << said;
+  EXPECT_NE(said.find("a smaller time step"), std::string::npos) << said;
+}
+
+TEST(Guards, AVelocityThatIsNoNumber) {
+  for (const InstructionSet set : available_instruction_sets())
+    for (const int threads : {1, 3})
+      for (const double wrong : {nan, inf, -inf, 1e200})
+        for (const bool spin : {false, true}) {
+          SCOPED_TRACE(std::string(to_string(set)) + " " + std::to_string(threads) + " " + std::to_string(wrong));
+          const std::string said = said_after(set, threads, [&](Particles& p, std::vector<Batch>&, std::size_t k) { (spin ? p.ux : p.vx)[k] = wrong; });
+          expect_named(said, "at step ");
+        }
+}
+
+TEST(Guards, ASphereAsFastAsNoneCanBe) {
+  for (const InstructionSet set : available_instruction_sets()) {
+    const std::string said = said_after(set, 1, [](Particles& p, std::vector<Batch>&, std::size_t k) { p.vz[k] = 5e3; });
+    expect_named(said, "in one step");
+  }
+}
+
+// A history that no path of overlaps leads to: its force is beyond what an overlap of R/2 could give.
+TEST(Guards, AForceBeyondAnyCredibleOne) {
+  for (const InstructionSet set : available_instruction_sets())
+    for (const double wrong : {1e9, nan}) {
+      const std::string said = said_after(set, 1, [&](Particles& p, std::vector<Batch>& batches, std::size_t k) {
+        for (Batch& b : batches)
+          for (std::size_t m = 0; m < static_cast<std::size_t>(b.used); ++m)
+            if (static_cast<std::size_t>(b.i[m]) == k || static_cast<std::size_t>(b.j[m]) == k) {
+              (std::isnan(wrong) ? b.tx : b.ty)[m] = wrong;
+              // Without friction's limit nothing would be left of it: the pair is made to stick.
+              b.sp[m] = -1.0;
+            }
+        (void)p;
+      }, [] {
+        PairLaw law = scenes::full_law();
+        law.friction = 1e12;
+        return law;
+      }());
+      EXPECT_NE(said.find("out of range at step "), std::string::npos) << said;
+      EXPECT_NE(said.find("a smaller time step"), std::string::npos) << said;
+    }
+}
+
+TEST(Guards, OverlapsAboveR) {
+  for (const InstructionSet set : available_instruction_sets()) {
+    EngineOptions engine;
+    engine.instruction_set = set;
+    scenes::BedOptions options;
+    options.nx = options.ny = 7;  // the box must be wide enough for a sphere not to meet another one twice
+    options.spacing = 0.9;
+    Simulation sim(scenes::bed(options, scenes::full_law(), engine));
+    sim.set_time_step(2e-6);
+    std::string said;
+    try {
+      sim.advance(1);
+    } catch (const RunError& error) {
+      said = error.what();
+    }
+    EXPECT_NE(said.find("forces out of range at step 0"), std::string::npos) << said;
+    EXPECT_NE(said.find("; spheres "), std::string::npos) << said;
+    for (const char* what : {" overlap by 1.", " R (plastic ", "approach at ", "push with ", "a smaller time step"}) EXPECT_NE(said.find(what), std::string::npos) << said;
+  }
+}
+
+// Sums over a chunk of pairs are looked at, single pairs only where a sum is too large: what is large but in range must pass.
+TEST(Guards, ManyStrongForcesAreNoFault) {
+  scenes::BedOptions options;
+  options.spacing = 1.1;  // overlaps of 0.9 R: below R, forces half their bound
+  options.speed = 0.0;
+  for (const InstructionSet set : available_instruction_sets()) {
+    EngineOptions engine;
+    engine.instruction_set = set;
+    PairLaw law = scenes::full_law();
+    law.k_adh = law.f0 = 0.0, law.k2 = law.k1;
+    Simulation sim(scenes::bed(options, law, engine));
+    sim.set_time_step(1e-9);
+    EXPECT_NO_THROW(sim.advance(2)) << to_string(set);
+  }
+}
+
+TEST(Guards, ASphereLostInOpenSpace) {
+  const std::string table = "id,x,y,z,vx\n3,0,0,0,40\n5,0.01,0.02,0,0\n";
+  const Trial run = run_case(table_case(time_passes("50 s")), {"time.step=\"20 us\"", "particles.law.k1=50", "particles.law.k2=100"}, {}, table);
+  EXPECT_EQ(run.outcome.exit_code, exit_numerical);
+  const std::string& said = run.outcome.message;
+  EXPECT_NE(said.find("a sphere is lost at step "), std::string::npos) << said;
+  EXPECT_NE(said.find("; sphere 3 at (20.0"), std::string::npos) << said;  // 1000 times 0.02 m
+  EXPECT_NE(said.find("farther out than 1000 times the box, 20 m"), std::string::npos) << said;
+  EXPECT_NE(said.find("periodic sides keep spheres in"), std::string::npos) << said;
+}
+
+TEST(Guards, AnOverlapAboveAQuarterOfTheDiameterIsTold) {
+  const std::string below = "id,x,y,z\n3,0,0,0\n5,0.0039,0,0\n";
+  const auto warnings = [](const std::string& spheres) {
+    const Trial run = run_case(table_case(time_passes("0.1 ms")), {"time.step=\"0.1 us\""}, {}, spheres);
+    return nlohmann::json::parse(read_file(run.path() / "summary.json"))["stages"][0]["warnings"].dump();
+  };
+  EXPECT_NE(warnings("id,x,y,z\n3,0,0,0\n5,0.0030,0,0\n").find("an overlap above a quarter of the diameter"), std::string::npos);
+  EXPECT_EQ(warnings(below), "[]");
+}
+
+}  // namespace
+}  // namespace platen
