@@ -17,6 +17,7 @@
 #include "protocol/study/analysis.h"
 #include "protocol/study/figures.h"
 #include "protocol/study/plan.h"
+#include "protocol/study/porosity_match.h"
 #include "protocol/study/runner.h"
 #include "protocol/study/statements.h"
 #include "protocol/study/study_file.h"
@@ -32,9 +33,11 @@ void print(const std::string& text) { std::fwrite(text.data(), 1, text.size(), s
 
 std::string plan_table(const StudyPlan& plan, const fs::path& folder) {
   std::string out;
-  for (const Job& job : plan.jobs)
-    out += fmt::format("{:<60} {:>8} spheres{}{}\n", job.name, job.c.particles.count, job.timed ? ", timed" : "",
-                       is_done(folder, job) ? ", done" : "");
+  for (Job job : plan.jobs) {
+    if (job.match) take_match(job, match_state(plan, job, folder));
+    out += fmt::format("{:<60} {:>8} spheres{}{}{}\n", job.name, job.c.particles.count, job.timed ? ", timed" : "",
+                       job.match ? ", as porous as " + plan.jobs[job.match->reference].name : "", is_done(folder, job) ? ", done" : "");
+  }
   return out;
 }
 
@@ -101,7 +104,7 @@ int exit_code_of(const std::vector<JobOutcome>& outcomes) {
 int study_command(const StudyCommand& command) {
   // Everything that can be wrong with the study is found before the folder is touched.
   const Study study = read_study(command.study_file, command.overrides);
-  const StudyPlan plan = make_plan(study);
+  StudyPlan plan = make_plan(study);
   if (command.dry_run) {
     print(plan_table(plan, command.folder));
     return exit_done;

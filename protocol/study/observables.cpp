@@ -12,6 +12,7 @@
 #include "protocol/output/hdf5_file.h"
 #include "protocol/output/results_h5.h"
 #include "protocol/output/series_csv.h"
+#include "protocol/study/settled_sample.h"
 
 namespace platen {
 namespace {
@@ -253,6 +254,7 @@ const ObservableKind& observable_kind(std::string_view name) {
 const std::vector<ScalarKind>& scalar_kinds() {
   static const std::vector<ScalarKind> kinds{
       {"porosity_filled", "-", "porosity at the end of fill"},
+      {"porosity_settled", "-", "porosity of the settled sample when the compression begins, without its lowest and highest slab"},
       {"porosity_at_100_pa", "-", "porosity when the stress first reaches 0.1 kPa"},
       {"porosity_start", "-", "porosity when the stress first reaches 1 kPa, or the strain zero where that is lower"},
       {"porosity_at_zero", "-", "porosity at the strain zero"},
@@ -296,6 +298,7 @@ RunMeasures measure_run(const std::filesystem::path& folder, const Case& c, std:
   const auto results = Hdf5File::open(folder / "results.h5");
   out.curves["porosity_height"] = height_profile(results.root(), first_stage(c, StageKind::compress));
   put(out, "largest_overlap", largest_overlap(results.root(), c));
+  put(out, "porosity_settled", settled_porosity(results.root(), c).value_or(nan));
   const nlohmann::json summary = nlohmann::json::parse(read_whole_file(folder / "summary.json"), nullptr, false);
   const std::string crush = first_stage(c, StageKind::crush);
   if (summary.is_object() && summary.contains("stages"))

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <set>
 #include <stdexcept>
 
@@ -11,6 +12,7 @@
 #include "protocol/case_document.h"
 #include "protocol/case_reader.h"
 #include "protocol/experiment.h"
+#include "protocol/study/porosity_match.h"
 
 namespace platen {
 namespace {
@@ -66,8 +68,21 @@ class Planner {
                           radius_text(*study.reference_radius), radius_text(sizes.radius)));
       return;
     }
+    if (study.match_porosity) try {
+        knob_of(*study.match_porosity, part.base);
+      } catch (const CaseError& error) {
+        problem(study.match_porosity->where, "study.match_porosity", std::string("does not fit the base case: ") + error.what());
+        return;
+      }
     for (const CurveSpec& spec : study.curves) add_block(part, spec);
     find_references(part);
+    std::vector<std::size_t> order(part.curves.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    if (study.match_porosity) {
+      if (!references_are_not_matched(part)) return;
+      std::stable_partition(order.begin(), order.end(), [&](std::size_t k) { return part.curves[k].reference == k; });
+    }
+    for (const std::size_t k : order) add_jobs(part, k);
     plan_.parts.push_back(std::move(part));
   }
 
@@ -110,13 +125,33 @@ class Planner {
               for (const VariedKey& key : spec.vary)
                 if (key.values.size() > 1)
                   curve.label += fmt::format(" {}={}", last_key(key.key), plain_value(variant.at(key.key)));
-              add_jobs(part, spec, curve);
               part.curves.push_back(std::move(curve));
             }
   }
 
-  void add_jobs(PlannedPart& part, const CurveSpec& spec, PlannedCurve& curve) {
+  // A chain of matches would add up their tolerances.
+  bool references_are_not_matched(const PlannedPart& part) {
+    for (const PlannedCurve& curve : part.curves) {
+      const PlannedCurve& reference = part.curves[curve.reference];
+      if (&part.curves[reference.reference] == &reference) continue;
+      problem(spec_of(part, curve).where, "curve.against",
+              fmt::format("\"{}\" is compared with \"{}\", which is compared with another curve; allowed with match_porosity: "
+                          "a curve that is compared with itself",
+                          curve.label, reference.label));
+      return false;
+    }
+    return true;
+  }
+
+  static const CurveSpec& spec_of(const PlannedPart& part, const PlannedCurve& curve) {
+    return *std::find_if(part.study->curves.begin(), part.study->curves.end(),
+                         [&](const CurveSpec& s) { return s.name == curve.block; });
+  }
+
+  void add_jobs(PlannedPart& part, std::size_t number) {
+    PlannedCurve& curve = part.curves[number];
     const Study& study = *part.study;
+    const CurveSpec& spec = spec_of(part, curve);
     std::vector<std::string> changes = study.set;
     changes.insert(changes.end(), spec.set.begin(), spec.set.end());
     for (const auto& [key, value] : curve.varied) changes.push_back(key + "=" + value);
@@ -134,9 +169,16 @@ class Planner {
         const std::string text = to_toml(parse_document(c.text, "case.toml"));
         c = parse_case(text, study.base.string(), {}, {});
         refuse_unstable_step(c);
+        std::optional<std::size_t> matched_to;
+        if (study.match_porosity && curve.reference != number) {
+          const std::vector<std::size_t>& references = part.curves[curve.reference].jobs;
+          if (references.size() <= curve.jobs.size()) return;  // the reference is wrong and has been reported
+          knob_of(*study.match_porosity, c);
+          matched_to = references[curve.jobs.size()];
+        }
         for (int repeat = 1; repeat <= study.repeats; ++repeat) {
           curve.seeds.push_back(seed);
-          curve.jobs.push_back(job(part, spec, curve, c, seed, study.timed ? repeat : 0));
+          curve.jobs.push_back(job(part, spec, curve, c, seed, study.timed ? repeat : 0, matched_to));
         }
       } catch (const CaseError& error) {
         problem(spec.where, "curve", fmt::format("\"{}\" is not a possible case:\n{}", curve.label, error.what()));
@@ -149,10 +191,15 @@ class Planner {
 
   // The job of this case; a new one only if no other curve needs it. repeat 0: not timed.
   std::size_t job(const PlannedPart& part, const CurveSpec& spec, const PlannedCurve& curve, const Case& c,
-                  std::uint64_t seed, int repeat) {
+                  std::uint64_t seed, int repeat, std::optional<std::size_t> matched_to) {
     const Study& study = *part.study;
-    const std::string identity =
-        c.text + fmt::format("\n#{} {}", repeat, repeat > 0 ? study.name + study.base.string() : "");
+    if (matched_to && plan_.jobs[*matched_to].c.text == c.text) return *matched_to;  // the reference itself, under another name
+    std::string identity = c.text + fmt::format("\n#{} {}", repeat, repeat > 0 ? study.name + study.base.string() : "");
+    if (matched_to) {
+      const PorosityMatch& m = *study.match_porosity;
+      const auto [low, high] = m.range.value_or(std::pair(0.0, 0.0));
+      identity += fmt::format("\n#matched {} {} {} {} {} {}", *matched_to, static_cast<int>(m.adjust), m.tolerance, low, high, m.most_tries);
+    }
     if (const auto known = known_.find(identity); known != known_.end()) return known->second;
     std::string name = (repeat > 0 ? "timed-" : "") + path_part(study.base.stem().string()) +
                        fmt::format("-R{:g}mm", 1e3 * curve.radius);
@@ -163,6 +210,7 @@ class Planner {
     for (const std::string& text : spec.set)
       name += "-" +
               path_part(last_key(text.substr(0, text.find('='))) + "=" + plain_value(text.substr(text.find('=') + 1)));
+    if (matched_to) name += "-matched";
     name += fmt::format("-s{}", seed);
     if (repeat > 0) name += fmt::format("-t{}", repeat);
     std::string unique = name;
@@ -170,6 +218,7 @@ class Planner {
     Job added;
     added.name = unique;
     added.c = c;
+    if (matched_to) added.match = JobMatch{&*study.match_porosity, *matched_to, c};
     const double dt = c.time.step ? *c.time.step : first_step(c).dt;
     const double spheres = static_cast<double>(c.particles.table ? static_cast<std::int64_t>(c.particles.table->size())
                                                                  : c.particles.count);
@@ -183,9 +232,8 @@ class Planner {
   // The member of the reference's block that agrees in every varied key that both have.
   void find_references(PlannedPart& part) {
     for (PlannedCurve& curve : part.curves) {
-      const auto spec = std::find_if(part.study->curves.begin(), part.study->curves.end(),
-                                     [&](const CurveSpec& s) { return s.name == curve.block; });
-      const std::string& wanted = spec->against.empty() ? part.study->curves.front().name : spec->against;
+      const CurveSpec& spec = spec_of(part, curve);
+      const std::string& wanted = spec.against.empty() ? part.study->curves.front().name : spec.against;
       std::vector<std::size_t> found;
       for (std::size_t k = 0; k < part.curves.size(); ++k) {
         const PlannedCurve& other = part.curves[k];

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,10 +12,19 @@
 
 namespace platen {
 
+// How the case of a job comes about where its porosity is matched.
+struct JobMatch {
+  const PorosityMatch* settings = nullptr;
+  std::size_t reference = 0;  // place in StudyPlan::jobs of the run whose porosity is wanted, itself not matched
+  Case start;                 // the case as it would be without matching
+  bool met = false;           // Job::c is the case that was found
+};
+
 // One run.
 struct Job {
   std::string name;     // of its folder, unique in the study
   Case c;               // c.text is the case.toml that the run folder must hold
+  std::optional<JobMatch> match;
   double weight = 0.0;  // expected cost, arbitrary unit: spheres over time step
   bool timed = false;
   int threads = 1;

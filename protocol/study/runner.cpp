@@ -17,7 +17,10 @@
 #include <sstream>
 #include <thread>
 
+#include "protocol/experiment.h"
 #include "protocol/output/files.h"
+#include "protocol/study/porosity_match.h"
+#include "protocol/study/settled_sample.h"
 
 namespace platen {
 namespace {
@@ -77,8 +80,8 @@ pid_t start(const fs::path& program, const std::vector<std::string>& words, cons
 
 class Runner {
  public:
-  Runner(const StudyPlan& plan, const RunnerOptions& options)
-      : plan_(plan), options_(options), outcomes_(plan.jobs.size()) {
+  Runner(StudyPlan& plan, const RunnerOptions& options)
+      : plan_(plan), options_(options), outcomes_(plan.jobs.size()), look_at_(plan.jobs.size()) {
     std::error_code error;
     for (const char* name : {"cases", "logs", "runs"}) {
       fs::create_directories(options.folder / name, error);
@@ -90,18 +93,16 @@ class Runner {
   std::vector<JobOutcome> run() {
     std::vector<std::size_t> many, alone;
     for (std::size_t k = 0; k < plan_.jobs.size(); ++k) {
-      if (is_done(options_.folder, plan_.jobs[k])) {
-        outcomes_[k].state = JobState::kept;
-        all_weight_ -= plan_.jobs[k].weight;
-        ++finished_;
-        if (options_.ended) options_.ended(plan_.jobs[k], outcomes_[k]);
-      } else {
+      if (plan_.jobs[k].match) take_match(plan_.jobs[k], match_state(plan_, plan_.jobs[k], options_.folder));
+      if (is_done(options_.folder, plan_.jobs[k]))
+        keep(k);
+      else
         (plan_.jobs[k].timed ? alone : many).push_back(k);
-      }
     }
     std::stable_sort(many.begin(), many.end(), [&](std::size_t a, std::size_t b) {
       const Job &p = plan_.jobs[a], &q = plan_.jobs[b];
-      return p.c.seed != q.c.seed ? p.c.seed < q.c.seed : p.weight > q.weight;
+      if (p.c.seed != q.c.seed) return p.c.seed < q.c.seed;
+      return p.match.has_value() != q.match.has_value() ? q.match.has_value() : p.weight > q.weight;
     });
     // By repetition: the plan has them side by side.
     const auto repetition = [&](std::size_t k) { return plan_.jobs[k].name.substr(plan_.jobs[k].name.rfind("-t")); };
@@ -109,8 +110,8 @@ class Runner {
       const std::string p = repetition(a), q = repetition(b);
       return p.size() != q.size() ? p.size() < q.size() : p < q;
     });
-    work(many, options_.jobs);
-    work(alone, 1);
+    work(std::move(many), options_.jobs);
+    work(std::move(alone), 1);
     for (JobOutcome& outcome : outcomes_)
       if (outcome.state == JobState::waiting) outcome.state = JobState::stopped;
     return std::move(outcomes_);
@@ -120,41 +121,87 @@ class Runner {
   struct Child {
     pid_t pid;
     std::size_t job;
+    std::size_t attempt;  // number of the try; 0: the run itself
     Clock::time_point begin;
     std::optional<double> steal;
   };
 
   bool stopping() const { return options_.stop_signal != nullptr && *options_.stop_signal != 0; }
 
-  void work(const std::vector<std::size_t>& queue, int at_once) {
-    std::size_t next = 0;
+  void work(std::vector<std::size_t> queue, int at_once) {
+    queue_ = std::move(queue);
     bool told = false;
-    while (next < queue.size() || !children_.empty()) {
-      while (!stopping() && next < queue.size() && static_cast<int>(children_.size()) < at_once) launch(queue[next++]);
+    while (!queue_.empty() || !children_.empty()) {
+      while (!stopping() && static_cast<int>(children_.size()) < at_once && go_on_with_one()) {
+      }
       if (stopping()) {
-        next = queue.size();
+        queue_.clear();
         if (!told)
           for (const Child& child : children_) ::kill(child.pid, SIGTERM);
         told = true;
       }
-      if (!reap() && !children_.empty()) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      if (!reap() && !(queue_.empty() && children_.empty())) std::this_thread::sleep_for(std::chrono::milliseconds(20));
       report();
     }
   }
 
-  void launch(std::size_t k) {
+  // Takes the first job of the queue that can go on a step further; false where all have to wait.
+  bool go_on_with_one() {
+    for (auto place = queue_.begin(); place != queue_.end(); ++place) {
+      const std::size_t k = *place;
+      const Job& job = plan_.jobs[k];
+      if (!job.match || job.match->met) {
+        queue_.erase(place);
+        if (is_done(options_.folder, job))
+          keep(k);  // of an earlier search
+        else
+          launch(k, 0, job.c);
+        return true;
+      }
+      if (Clock::now() < look_at_[k]) continue;
+      const MatchState state = match_state(plan_, job, options_.folder);
+      take_match(plan_.jobs[k], state);
+      if (state.kind == MatchState::Kind::waits) {
+        const JobState reference = outcomes_[job.match->reference].state;
+        if (reference == JobState::waiting || reference == JobState::running) {
+          look_at_[k] = Clock::now() + std::chrono::milliseconds(200);
+          continue;
+        }
+        queue_.erase(place);
+        fail(k, exit_goal, "its reference " + plan_.jobs[job.match->reference].name + " has no settled sample");
+      } else if (state.kind == MatchState::Kind::attempt) {
+        queue_.erase(place);
+        launch(k, state.tries.size() + 1, state.c);
+      } else if (state.kind == MatchState::Kind::failed) {
+        queue_.erase(place);
+        fail(k, exit_goal, state.message);
+      }
+      return true;  // met: the next look runs it
+    }
+    return false;
+  }
+
+  // The run of a job, or one of its tries.
+  void launch(std::size_t k, std::size_t attempt, const Case& c) {
     const Job& job = plan_.jobs[k];
-    const fs::path folder = run_folder(options_.folder, job), file = options_.folder / "cases" / (job.name + ".toml");
-    write_whole_file(file, job.c.text);
+    const std::string name = title(k, attempt, "-try");
+    const fs::path folder = attempt == 0 ? run_folder(options_.folder, job) : try_folder(options_.folder, job, attempt);
+    const fs::path file = options_.folder / "cases" / (name + ".toml");
+    write_whole_file(file, c.text);
     wait_until_free(folder);
     std::vector<std::string> words{
         "platen",  "run",    file.string(), "-o", folder.string(), "--threads", std::to_string(job.threads),
         "--force", "--quiet"};
+    if (attempt > 0) words.insert(words.end(), {"--stop-after", settled_stage(c)->name});
     outcomes_[k].state = JobState::running;
     const std::optional<double> steal = job.timed ? steal_seconds() : std::nullopt;
     children_.push_back(
-        {start(options_.program, words, options_.folder / "logs" / (job.name + ".txt")), k, Clock::now(), steal});
-    newest_ = job.name;
+        {start(options_.program, words, options_.folder / "logs" / (name + ".txt")), k, attempt, Clock::now(), steal});
+    newest_ = title(k, attempt, " try ");
+  }
+
+  std::string title(std::size_t k, std::size_t attempt, const char* word) const {
+    return plan_.jobs[k].name + (attempt > 0 ? word + std::to_string(attempt) : "");
   }
 
   // Takes in every child that has ended; whether there was one.
@@ -178,9 +225,14 @@ class Runner {
     const Job& job = plan_.jobs[child.job];
     JobOutcome& outcome = outcomes_[child.job];
     outcome.wall_seconds = since(child.begin);
-    outcome.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-    if (stopping() && outcome.exit_code != 0) {
+    const int exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    if (stopping() && exit_code != 0) {
       outcome.state = JobState::stopped;
+      outcome.exit_code = exit_code;
+    } else if (child.attempt > 0 && match_state(plan_, job, options_.folder).tries.size() >= child.attempt) {
+      outcome.state = JobState::waiting;
+      queue_.insert(queue_.begin(), child.job);  // the next try, or the run, before jobs that have not begun
+      return;
     } else if (is_done(options_.folder, job)) {
       outcome.state = JobState::done;
       outcome.exit_code = 0;
@@ -193,16 +245,32 @@ class Runner {
         write_whole_file(run_folder(options_.folder, job) / "timing.json", timing.dump(2) + "\n");
       }
     } else {
-      outcome.state = JobState::failed;
-      outcome.message = WIFEXITED(status) ? last_line(options_.folder / "logs" / (job.name + ".txt"))
-                                          : fmt::format("ended by signal {}", WTERMSIG(status));
-      if (outcome.message.empty()) outcome.message = fmt::format("exit code {}", outcome.exit_code);
-      all_weight_ -= job.weight;
-      ++failed_;
+      std::string message = WIFEXITED(status) ? last_line(options_.folder / "logs" / (title(child.job, child.attempt, "-try") + ".txt"))
+                                              : fmt::format("ended by signal {}", WTERMSIG(status));
+      if (message.empty()) message = fmt::format("exit code {}", exit_code);
+      if (child.attempt > 0) message = fmt::format("try {}: ", child.attempt) + message;
+      return fail(child.job, exit_code, message);
     }
     if (outcome.state != JobState::stopped) ++finished_;
     newest_ = job.name;
     if (options_.ended) options_.ended(job, outcome);
+  }
+
+  void keep(std::size_t k) {
+    outcomes_[k].state = JobState::kept;
+    all_weight_ -= plan_.jobs[k].weight;
+    ++finished_;
+    if (options_.ended) options_.ended(plan_.jobs[k], outcomes_[k]);
+  }
+
+  void fail(std::size_t k, int exit_code, const std::string& message) {
+    outcomes_[k].state = JobState::failed;
+    outcomes_[k].exit_code = exit_code;
+    outcomes_[k].message = message;
+    all_weight_ -= plan_.jobs[k].weight;
+    ++failed_, ++finished_;
+    newest_ = plan_.jobs[k].name;
+    if (options_.ended) options_.ended(plan_.jobs[k], outcomes_[k]);
   }
 
   void report() {
@@ -218,7 +286,7 @@ class Runner {
     if (done_seconds_ > 0.0) {
       const double rate = done_weight_ / done_seconds_;
       for (const Child& child : children_)
-        under_way += std::min(0.95 * plan_.jobs[child.job].weight, rate * since(child.begin));
+        if (child.attempt == 0) under_way += std::min(0.95 * plan_.jobs[child.job].weight, rate * since(child.begin));
       const double left = std::max(0.0, all_weight_ - done_weight_ - under_way) / rate;
       p.seconds_left =
           left / std::max<double>(1.0, std::min<double>(options_.jobs, static_cast<double>(p.jobs - finished_)));
@@ -227,9 +295,11 @@ class Runner {
     options_.progress(p);
   }
 
-  const StudyPlan& plan_;
+  StudyPlan& plan_;
   const RunnerOptions& options_;
   std::vector<JobOutcome> outcomes_;
+  std::vector<Clock::time_point> look_at_;  // when a job that waits for its reference is looked at again
+  std::vector<std::size_t> queue_;          // jobs of which nothing runs, to be gone on with in this order
   std::string newest_;
   std::vector<Child> children_;
   Clock::time_point begin_ = Clock::now();
@@ -242,6 +312,7 @@ class Runner {
 fs::path run_folder(const fs::path& study_folder, const Job& job) { return study_folder / "runs" / job.name; }
 
 bool is_done(const fs::path& study_folder, const Job& job) {
+  if (job.match && !job.match->met) return false;
   const fs::path folder = run_folder(study_folder, job);
   std::error_code ignored;
   if (!fs::is_regular_file(folder / "summary.json", ignored) || text_of(folder / "case.toml") != job.c.text)
@@ -250,7 +321,7 @@ bool is_done(const fs::path& study_folder, const Job& job) {
   return summary.is_object() && summary.contains("exit_code") && summary["exit_code"] == 0;
 }
 
-std::vector<JobOutcome> run_jobs(const StudyPlan& plan, const RunnerOptions& options) {
+std::vector<JobOutcome> run_jobs(StudyPlan& plan, const RunnerOptions& options) {
   return Runner(plan, options).run();
 }
 

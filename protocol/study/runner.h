@@ -2,7 +2,9 @@
 //
 //   done already?   runs/<job>/summary.json has exit_code 0 and runs/<job>/case.toml is the wanted text: kept
 //   otherwise       platen run cases/<job>.toml -o runs/<job> --threads N --force, its output in logs/<job>.txt
-// Jobs that are not timed go first, J at a time, the most expensive of each seed first; then the timed ones, alone, in
+//   porosity matched    first, up to the settled sample, once the reference's run has come so far and until one is right:
+//                   platen run cases/<job>-try1.toml -o tries/<job>/1 --stop-after settle ... (porosity_match.h)
+// Jobs that are not timed go first, J at a time, references and the most expensive of each seed first; then the timed ones, alone, in
 // the order sizes inside repetitions, so that a slow minute of the machine hits all sizes. A child dies with this
 // process, however that ends.
 #pragma once
@@ -48,12 +50,12 @@ struct RunnerOptions {
 
 std::filesystem::path run_folder(const std::filesystem::path& study_folder, const Job& job);
 
-// Whether the folder of the job holds its finished run.
+// Whether the folder of the job holds its finished run. Of a matched job only once its case is known (take_match).
 bool is_done(const std::filesystem::path& study_folder, const Job& job);
 
-// One outcome a job. A failing job does not end the others. Throws OutputError where the study's own files cannot be
+// One outcome a job; matched jobs get their cases. A failing job does not end the others. Throws OutputError where the study's own files cannot be
 // written or no process can be started.
-std::vector<JobOutcome> run_jobs(const StudyPlan& plan, const RunnerOptions& options);
+std::vector<JobOutcome> run_jobs(StudyPlan& plan, const RunnerOptions& options);
 
 // Steal time of the machine since it was started, over all cores [s]; empty where /proc/stat does not tell.
 std::optional<double> steal_seconds();

@@ -164,6 +164,32 @@ void read_seeds(TableReader& table, std::vector<std::uint64_t>& out) {
   out = std::move(seeds);
 }
 
+void read_match(TableReader match, std::optional<PorosityMatch>& out) {
+  if (!match.present()) return;
+  PorosityMatch found;
+  found.where = match.where("");
+  match.number("tolerance", Range{0.0, 0.1, false, true}, Need::required, found.tolerance);
+  std::size_t adjust = 0;
+  const bool known = match.word("adjust", {"vibration", "growth"}, Need::required, adjust);
+  found.adjust = adjust == 0 ? PorosityMatch::Adjust::vibration : PorosityMatch::Adjust::growth;
+  std::vector<double> range;
+  if (!known)
+    match.has("range");  // what it means is not known
+  else if (adjust == 0 ? match.quantities("range", Quantity::time, positive, Need::optional, range)
+                       : match.numbers("range", fraction, Need::optional, range)) {
+    if (range.size() == 2 && range[0] < range[1])
+      found.range = {range[0], range[1]};
+    else
+      match.error("range", std::string("is not a range; allowed: the least and the largest ") +
+                               (adjust == 0 ? "duration of the vibration, as [\"0.1 s\", \"8 s\"]" : "porosity of the growth, as [0.38, 0.45]"));
+  }
+  std::int64_t most_tries = found.most_tries;
+  match.integer("most_tries", 1, 1000, Need::optional, most_tries);
+  found.most_tries = static_cast<int>(most_tries);
+  match.refuse_unknown("match_porosity");
+  out = found;
+}
+
 // What has a meaning only where there are runs of its own.
 void read_own(TableReader& root, TableReader& head, Study& study, Problems& problems) {
   std::string base;
@@ -191,6 +217,9 @@ void read_own(TableReader& root, TableReader& head, Study& study, Problems& prob
   head.integer("threads", 1, 4096, Need::optional, threads);
   study.repeats = static_cast<int>(repeats);
   study.threads = static_cast<int>(threads);
+  read_match(head.table("match_porosity"), study.match_porosity);
+  if (study.match_porosity && study.timed)
+    head.error("match_porosity", "samples of timed runs are not matched; allowed: without timed = true");
 
   std::vector<std::string> names;
   tables(root, "curve", problems, [&](TableReader& table) {

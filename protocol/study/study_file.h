@@ -46,6 +46,16 @@ struct ScanSpec {
   std::vector<std::string> observables;  // empty: all of the study
 };
 
+// match_porosity: the settled samples of all curves get the porosity of those that they are compared with.
+struct PorosityMatch {
+  enum class Adjust { vibration, growth };
+  Adjust adjust = Adjust::vibration;
+  double tolerance = 0.0;                          // of porosity
+  std::optional<std::pair<double, double>> range;  // vibration: duration [s]; growth: porosity; empty: around the case's
+  int most_tries = 12;                             // of each run
+  Position where;
+};
+
 struct Study {
   std::string title;
   std::string name;  // stem of its file
@@ -62,6 +72,7 @@ struct Study {
   bool timed = false;                    // runs alone, interleaved, their wall time is a result
   int repeats = 1;                       // of timed runs
   int threads = 1;                       // of each run
+  std::optional<PorosityMatch> match_porosity;
   std::vector<CurveSpec> curves;
   std::vector<FigureSpec> figures;
   std::vector<ScanSpec> scans;

@@ -8,6 +8,7 @@
 
 #include "protocol/output/files.h"
 #include "protocol/output/hdf5_file.h"
+#include "protocol/study/porosity_match.h"
 
 namespace platen {
 namespace {
@@ -127,6 +128,30 @@ void write_timing(const fs::path& file, const StudyPlan& plan, const PartResults
   write_whole_file(file, text);
 }
 
+// How each porosity was matched, from the tries on disk.
+void write_match(const fs::path& folder, const fs::path& file, const StudyPlan& plan, const PlannedPart& part) {
+  const PorosityMatch& match = *part.study->match_porosity;
+  std::string text = std::string(curve_header) + ",seed,run,matched to,wanted porosity [-],tolerance [-],met,porosity [-],key,value,tried values,their porosities [-]\n";
+  for (const PlannedCurve& curve : part.curves)
+    for (std::size_t k = 0; k < curve.jobs.size(); ++k) {
+      const Job& job = plan.jobs[curve.jobs[k]];
+      if (!job.match) continue;
+      const MatchState state = match_state(plan, job, folder);
+      std::vector<double> values, porosities;
+      double value = nan, porosity = nan;
+      for (const PorosityTry& one : state.tries) {
+        values.push_back(knob_value(match, job.match->start, one.knob));
+        porosities.push_back(one.porosity.value_or(nan));
+        if (one.knob == state.knob) value = values.back(), porosity = porosities.back();
+      }
+      text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", curve_cells(curve), curve.seeds[k], cell(job.name),
+                          cell(plan.jobs[job.match->reference].name), cell(state.target), cell(match.tolerance),
+                          job.match->met ? "yes" : "no", cell(porosity), cell(adjusted_key(match, job.match->start)), cell(value),
+                          list(values), list(porosities));
+    }
+  write_whole_file(file, text);
+}
+
 // A label as the name of an HDF5 group: "/" would make a path of it.
 std::string group_name(std::string label) {
   std::replace(label.begin(), label.end(), '/', '_');
@@ -190,6 +215,7 @@ void write_part_tables(const fs::path& folder, const StudyPlan& plan, const Part
   write_scalars(tables / "scalars.csv", part);
   write_collapse(tables / "collapse.csv", part);
   if (!part.plan->study->scans.empty()) write_scans(tables / "scans.csv", part);
+  if (part.plan->study->match_porosity) write_match(folder, tables / "porosity_match.csv", plan, *part.plan);
   if (part.plan->study->timed) write_timing(tables / "timing.csv", plan, part);
 }
 
