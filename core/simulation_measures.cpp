@@ -352,13 +352,14 @@ std::uint64_t Simulation::state_hash(const std::string& extra) {
   return hash;
 }
 
-StepLimits Simulation::step_limits() {
+StepLimits Simulation::limits_of_network(std::string* ruled_by) {
   const FloatMode mode;
   ensure_forces();
   std::vector<NetworkBody> bodies(static_cast<std::size_t>(particles_.count));
   for (std::size_t rank = 0; rank < bodies.size(); ++rank)
     bodies[rank] = {particles_.mass_of(particles_.place[rank]), particles_.radius_of(particles_.place[rank])};
   std::vector<StiffContact> contacts;
+  std::vector<int> plates;  // of the contacts behind those of pairs
   for (const Batch& b : batches_)
     for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k) {
       const std::int32_t ri = particles_.rank[static_cast<std::size_t>(b.i[k])], rj = particles_.rank[static_cast<std::size_t>(b.j[k])];
@@ -383,8 +384,19 @@ StepLimits Simulation::step_limits() {
     contact.c_n = std::sqrt(plate_law_.damping * body.mass * contact.k_n);
     contact.c_t = std::sqrt(plate_law_.damping * body.mass * contact.k_t);
     contacts.push_back(contact);
+    plates.push_back(h.plate);
   }
-  return platen::step_limits(bodies, contacts);
+  StepLimitOptions options;
+  options.find_ruling = ruled_by != nullptr;
+  const StepLimits limits = platen::step_limits(bodies, contacts, {}, options);
+  if (ruled_by && limits.ruling_contact >= 0) {
+    const auto at = static_cast<std::size_t>(limits.ruling_contact), pairs = contacts.size() - plates.size();
+    const StiffContact& c = contacts[at];
+    const auto id = [this](int rank) { return std::to_string(particles_.id_of_rank[static_cast<std::size_t>(rank)]); };
+    constexpr const char* names[plate_count] = {"the bottom plate", "the top plate", "a wall", "a wall", "a wall", "a wall"};
+    *ruled_by = at < pairs ? "spheres " + id(c.i) + " and " + id(c.j) : "sphere " + id(c.i) + " and " + names[plates[at - pairs]];
+  }
+  return limits;
 }
 
 void Simulation::fail(const std::string& what) {

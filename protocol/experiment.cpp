@@ -147,6 +147,10 @@ class Experiment {
   // The automatic step, or the watch over a fixed one.
   void watch_time_step(Stand& stand, const Measures& m) {
     const StepLimits limits = sim_->step_limits();
+    StepRange& range = current_.time_step;
+    range.dt_crit = std::min(range.dt_crit, limits.dt_crit), range.dt_limit = std::min(range.dt_limit, limits.dt_limit);
+    if (std::isfinite(limits.dt_limit))
+      folder_.log("limits", {{"step", sim_->step()}, {"dt", sim_->time_step()}, {"dt_crit", limits.dt_crit}, {"dt_limit", limits.dt_limit}});
     if (c_.time.step) {
       const double ratio = sim_->time_step() / limits.dt_limit;
       if (ratio > 1.0 && !c_.time.allow_unstable)
@@ -237,6 +241,8 @@ class Experiment {
       if (exact) target = std::min(target, std::max(*exact, sim_->step() + 1));
       target = std::min(target, next_sample);
       target = std::min(target, longest);
+      current_.time_step.smallest = std::min(current_.time_step.smallest, sim_->time_step());
+      current_.time_step.largest = std::max(current_.time_step.largest, sim_->time_step());
       sim_->advance(target - sim_->step());
       show_progress(index, stand, exact, stage_begin);
     }
@@ -252,7 +258,12 @@ class Experiment {
     current_.strain_zero_height = strain_zero_height_;
     const Snapshot snapshot = sim_->snapshot(c_.output.contacts);
     const Profile heights = sim_->area() > 0.0 ? profile(snapshot, sim_->area(), c_.output.slabs) : Profile{};
-    if (end != End::stopped) std::visit([&](auto& s) { s.end(stand, current_); }, stage);
+    if (end != End::stopped) {
+      const StepLimits limits = sim_->step_limits(current_.time_step.ruled_by);
+      current_.time_step.dt_crit = std::min(current_.time_step.dt_crit, limits.dt_crit);
+      current_.time_step.dt_limit = std::min(current_.time_step.dt_limit, limits.dt_limit);
+      std::visit([&](auto& s) { s.end(stand, current_); }, stage);
+    }
     closed_.push_back(current_);
     stage_open_ = false;
     folder_.close_stage(current_, snapshot, heights);

@@ -20,6 +20,13 @@ struct SeriesRow {
   Measures measures;
 };
 
+// The time step in a stage and the limits that were found meanwhile, smallest ones [s]; infinite where none were.
+struct StepRange {
+  double smallest = std::numeric_limits<double>::infinity(), largest = 0.0;
+  double dt_crit = std::numeric_limits<double>::infinity(), dt_limit = std::numeric_limits<double>::infinity();
+  std::string ruled_by;  // contact that rules at the end of the stage; empty without contacts
+};
+
 struct StageResult {
   std::string name;
   StageKind kind = StageKind::run;
@@ -34,6 +41,7 @@ struct StageResult {
   std::optional<double> strength_strain;
   std::optional<double> initial_stiffness;   // [Pa]
   std::optional<bool> peak_found;
+  StepRange time_step;
   std::vector<std::string> warnings;
   SeriesRow last;                            // the stage's last row
 };

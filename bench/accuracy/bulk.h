@@ -37,9 +37,10 @@ struct BulkSize {
   double stress = 40e3;        // [Pa]
   int seeds = 8, scale_seeds = 4;
   std::vector<double> shares;  // steps, of dt_crit, smallest first: that is the reference
+  std::vector<double> safeties;  // of the automatic step
   std::vector<double> speeds;  // [m/s], slowest first: the reference
   std::vector<double> radii;   // [m], finest first: the reference
-  double share = 0.4;          // step of all parts but the step, of dt_crit
+  double safety = 0.3;         // of the automatic step, in all parts but the two on steps
   double bed_share = 0.1, vibration = 1.0;  // [s]
   bool strict = true;          // settle by the experiment's own criterion
 };
@@ -47,11 +48,12 @@ struct BulkSize {
 inline BulkSize bulk_size(bool quick) {
   BulkSize s;
   s.shares = {0.0625, 0.125, 0.2, 0.3, 0.4, 0.5, 0.6, 0.75, 0.9};
+  s.safeties = {0.2, 0.3, 0.4, 0.5};
   s.speeds = {0.0025, 0.005, 0.01, 0.02, 0.04, 0.08};
   s.radii = {2e-3, 2.5e-3, 3e-3, 3.75e-3, 5e-3};
   if (!quick) return s;
   s.count = 140, s.side = 0.02, s.speed = 0.2, s.stress = 20e3, s.seeds = 3, s.scale_seeds = 2;
-  s.shares = {0.1, 0.2, 0.4}, s.speeds = {0.1, 0.4}, s.radii = {3e-3, 3.75e-3};
+  s.shares = {0.1, 0.2, 0.4}, s.safeties = {0.2, 0.4}, s.speeds = {0.1, 0.4}, s.radii = {3e-3, 3.75e-3};
   s.bed_share = 0.2, s.vibration = 0.05, s.strict = false;
   return s;
 }
@@ -62,22 +64,23 @@ struct Setting {
   double value = 0.0;          // of what the part varies
   double share = 0.0, speed = 0.0, radius = scale_radius;
   double skin = 0.0;           // 0: chosen by the engine [m]
+  bool automatic = false;      // share is the safety of step = "auto"
   bool reproducible = false;
   int seeds = 0;
 };
 
 inline int count_of(const BulkSize& s, double radius) { return static_cast<int>(std::lround(s.count * std::pow(scale_radius / radius, 3))); }
 
-// dt_crit grows with R when the stiffness does.
-inline std::string bulk_text(const BulkCase& b, const BulkSize& s, int seed, double radius, double dt, const std::string& particles, double skin = 0.0) {
+// `step`: the lines of [time].
+inline std::string bulk_text(const BulkCase& b, const BulkSize& s, int seed, double radius, const std::string& step, const std::string& particles, double skin = 0.0) {
   const double scale = radius / scale_radius;
   const double volume = s.count * 4.0 / 3.0 * 3.14159265358979 * std::pow(scale_radius, 3);
   return fmt::format(
              "[case]\ntitle = \"accuracy, case {}\"\nseed = {}\n[particles]\ndensity = 2000.0\nradius = {}\n{}[particles.law]\n"
              "k1 = {}\nk2 = {}\nk_adh = {}\nf0 = {}\nrestitution = 0.4\nfriction = 0.5\nrolling_friction = 0.001\n",
              b.name, seed, radius, particles, 7500.0 * scale, 37500.0 * scale, b.k_adh * scale, b.f0 * scale * scale) +
-         fmt::format("[box]\nwidth = {}\ndepth = {}\nheight = {}\n[time]\nstep = {}\n[output]\nseries = 5e-3\nframes = \"off\"\ncontacts = false\n",
-                     s.side, s.side, 1.2 * volume / (0.5 * s.side * s.side), dt) +
+         fmt::format("[box]\nwidth = {}\ndepth = {}\nheight = {}\n[time]\n{}\n[output]\nseries = 5e-3\nframes = \"off\"\ncontacts = false\n",
+                     s.side, s.side, 1.2 * volume / (0.5 * s.side * s.side), step) +
          (skin > 0.0 ? fmt::format("[engine]\nskin = {}\n", skin) : "");
 }
 
@@ -89,16 +92,18 @@ inline std::string bed_name(double radius, int seed) {
   return radius == scale_radius ? fmt::format("bed-{}", seed) : fmt::format("bed-{:g}mm-{}", 1e3 * radius, seed);
 }
 
-// dt_crit: at scale_radius.
+// A share of dt_crit, which is given at scale_radius and grows with R when the stiffness does.
+inline std::string fixed_step(double share, double dt_crit, double radius) { return fmt::format("step = {}", share * dt_crit * radius / scale_radius); }
+
 inline Job bed_job(const BulkCase& b, const BulkSize& s, int seed, double radius, double dt_crit) {
-  std::string text = bulk_text(b, s, seed, radius, s.bed_share * dt_crit * radius / scale_radius, fmt::format("count = {}\n", count_of(s, radius)));
+  std::string text = bulk_text(b, s, seed, radius, fixed_step(s.bed_share, dt_crit, radius), fmt::format("count = {}\n", count_of(s, radius)));
   text += "[[stage]]\nkind = \"fill\"\n";
   if (b.vibrate) text += fmt::format("[[stage]]\nkind = \"vibrate\"\nfrequency = 60.0\namplitude = 1.5e-3\nduration = {}\n", s.vibration);
   return {bed_name(radius, seed), text + settle_text(s.strict)};
 }
 
 inline Job variant_job(const BulkCase& b, const BulkSize& s, int seed, const Setting& v, double dt_crit) {
-  std::string text = bulk_text(b, s, seed, v.radius, v.share * dt_crit * v.radius / scale_radius, fmt::format("file = \"{}.csv\"\n", bed_name(v.radius, seed)), v.skin);
+  std::string text = bulk_text(b, s, seed, v.radius, v.automatic ? fmt::format("step = \"auto\"\nsafety = {}", v.share) : fixed_step(v.share, dt_crit, v.radius), fmt::format("file = \"{}.csv\"\n", bed_name(v.radius, seed)), v.skin);
   text += settle_text(s.strict);
   text += fmt::format("[[stage]]\nkind = \"compress\"\nspeed = {}\nstart_gap = 1e-4\nuntil = {{ stress = {} }}\n", v.speed, s.stress);
   if (b.crush)

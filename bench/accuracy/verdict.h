@@ -119,7 +119,7 @@ inline std::string recommendation_table(const std::vector<Verdict>& verdicts, co
         if (!best || seconds_of(figures, *v.setting).mean < seconds_of(figures, *best->setting).mean) best = &v;
       }
       if (!best) lines += fmt::format("| {} | {:g} % | none of those measured | | |\n", q.name, 100 * accepted);
-      else lines += fmt::format("| {} | {:g} % | dt = {:g} dt_crit, plates at {:g} mm/s | {:.1f} | {:.2f} % |\n", q.name, 100 * accepted, best->setting->share, 1e3 * best->setting->speed,
+      else lines += fmt::format("| {} | {:g} % | {}, plates at {:g} mm/s | {:.1f} | {:.2f} % |\n", q.name, 100 * accepted, best->setting->automatic ? fmt::format("safety {:g}", best->setting->share) : fmt::format("dt = {:g} dt_crit", best->setting->share), 1e3 * best->setting->speed,
                                 seconds_of(figures, *best->setting).mean, 100 * best->bound() / std::fabs(best->mean));
     }
   }
