@@ -10,10 +10,11 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <set>
 
 #include "bench/accuracy/bulk.h"
 #include "bench/accuracy/collisions.h"
-#include "bench/accuracy/verdict.h"
+#include "bench/accuracy/trend.h"
 
 using namespace platen;
 using namespace platen::bench;
@@ -193,6 +194,14 @@ int main(int argc, char** argv) {
                           "over the scatter between seeds of the reference.\n\n", dt_crit, 1e-3 * size.stress);
     part("step", fmt::format("The bed over the step, plates at {:g} mm/s", 1e3 * size.speed), "dt / dt_crit", true, [](const Setting& v) { return fmt::format("{:g}", v.value); });
     part("auto", "The bed over the safety of the automatic step", "safety", true, [](const Setting& v) { return v.automatic ? fmt::format("{:g}", v.value) : fmt::format("fixed, {:g} dt_crit", v.share); });
+    if (std::find(parts.begin(), parts.end(), "auto") != parts.end()) {
+      std::vector<const Setting*> steps;
+      std::set<std::string> known;
+      for (const Setting& v : settings)
+        if ((v.part == "step" || v.part == "auto") && known.insert(v.name).second) steps.push_back(&v);
+      report += "### Trend over the step\n\nLeast squares through all these runs, a level for each seed and one slope: the change between this step and none, ± standard error. Bounds as above, in the order of the columns.\n\n" +
+                trend_table(steps, figures, crush, dt_crit) + "\n";
+    }
     part("speed", fmt::format("The bed over the speed of the plates, safety {:g}", size.safety), "plate speed (mm/s)", true, [](const Setting& v) { return fmt::format("{:g}", 1e3 * v.value); });
     part("same", "What must not matter", "setting", true, [](const Setting& v) { return v.reproducible ? std::string("--reproducible") : v.skin > 0 ? fmt::format("skin {:g} R", v.value) : std::string("default"); });
     part("scale", "The bed over the size of the spheres, stiffness ~ R, f0 ~ R^2", "R (mm)", false, [](const Setting& v) { return fmt::format("{:g}", 1e3 * v.value); });

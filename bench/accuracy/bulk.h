@@ -40,7 +40,7 @@ struct BulkSize {
   std::vector<double> safeties;  // of the automatic step
   std::vector<double> speeds;  // [m/s], slowest first: the reference
   std::vector<double> radii;   // [m], finest first: the reference
-  double safety = 0.3;         // of the automatic step, in all parts but the two on steps
+  double safety = 0.4;         // of the automatic step, in all parts but the two on steps
   double bed_share = 0.1, vibration = 1.0;  // [s]
   bool strict = true;          // settle by the experiment's own criterion
 };
@@ -128,7 +128,7 @@ inline void write_bed(const std::filesystem::path& run, const std::filesystem::p
 // Figures of one run; NaN where the run did not get so far.
 inline std::map<std::string, double> bulk_figures(const std::filesystem::path& run) {
   std::map<std::string, double> r;
-  for (const char* key : {"strain", "porosity", "coordination_number", "strength", "energy", "seconds", "exit_code"}) r[key] = std::nan("");
+  for (const char* key : {"strain", "porosity", "coordination_number", "strength", "energy", "dt", "seconds", "exit_code"}) r[key] = std::nan("");
   const nlohmann::json summary = summary_of(run);
   if (!summary.is_object()) return r;
   r["exit_code"] = summary.value("exit_code", -1);
@@ -137,6 +137,7 @@ inline std::map<std::string, double> bulk_figures(const std::filesystem::path& r
     const auto& values = stage.at("values");
     if (stage.at("kind") == "compress" && stage.at("end_reason") != "failed") {
       for (const char* key : {"strain", "porosity", "coordination_number"}) r[key] = values.value(key, std::nan(""));
+      r["dt"] = stage.at("time").get<double>() / stage.at("steps").get<double>();
       double dissipated = 0.0;
       for (const char* key : {"plastic_dissipation", "viscous_dissipation", "sliding_dissipation", "rolling_dissipation"}) dissipated += values.value(key, 0.0);
       r["energy"] = std::fabs(values.value("energy_residual", std::nan(""))) / dissipated;
