@@ -86,34 +86,48 @@ std::vector<Setting> settings_of(const std::vector<std::string>& parts, const Bu
   return settings;
 }
 
-void plot(const fs::path& folder, bool crush) {
+// gnuplot stops at a plot without points: only what was measured is drawn.
+void plot(const fs::path& folder, bool crush, const std::vector<std::string>& parts) {
+  const auto asked = [&](const char* part) { return std::find(parts.begin(), parts.end(), part) != parts.end(); };
   std::ofstream gp(folder / "plots.gp");
-  gp << "set datafile separator ','\nset datafile missing NaN\nset terminal svg noenhanced size 720,480 font 'sans,13'\nset logscale xy\nset format y '%.0e'\nset key outside below\nset grid\n"
-        "set output 'collisions.svg'\nset xlabel 'wall time of 48 collisions (s)'\nset ylabel 'mean error of restitution'\n"
-        "plot for [k=0:3] 'collisions.csv' index k using 5:3 skip (k == 0 ? 1 : 0) with linespoints title word('elastic damped plastic cohesive', k+1)\n"
-        "set output 'collisions-step.svg'\nset xlabel 'dt / dt_crit'\n"
-        "plot for [k=0:3] 'collisions.csv' index k using 2:3 skip (k == 0 ? 1 : 0) with linespoints title word('elastic damped plastic cohesive', k+1), x*x title 'second order' dashtype 2 lc 'grey', 0.1*x title 'first order' dashtype 3 lc 'grey'\n"
-        "unset logscale y\nset format y '%g'\n";
-  for (const std::string what : {"step", "auto", "speed", "scale"})
-    for (const Quantity& q : quantities) {
-      if (!crush && std::string(q.key) == "strength") continue;
-      const std::string rows = fmt::format("'bulk.csv' using (strcol(1) eq '{}' && strcol(4) eq '{}' ? column(2) : NaN)", what, q.key);
-      gp << fmt::format("set output 'bulk-{}-{}.svg'\nset xlabel '{}'\nset ylabel '{}'\n"
-                        "plot {}:5:6 skip 1 with yerrorlines title 'difference to the reference, standard error', {}:7 skip 1 with lines lc 'grey' title 'scatter between seeds', "
-                        "{}:(-column(7)) skip 1 with lines lc 'grey' notitle\n",
-                        what, q.key, what == "step" ? "dt / dt_crit" : what == "auto" ? "safety" : what == "speed" ? "plate speed (m/s)" : "R (m)", q.name, rows, rows, rows);
-    }
-  // Work against precision: every setting of a part is a point of its line.
+  gp << "set datafile separator ','\nset datafile missing NaN\nset terminal svg noenhanced size 720,480 font 'sans,13'\nset key outside below\nset grid\n";
+  if (asked("collisions"))
+    gp << "set logscale xy\nset format y '%.0e'\nset output 'collisions.svg'\nset xlabel 'wall time of 48 collisions (s)'\nset ylabel 'mean error of restitution'\n"
+          "plot for [k=0:3] 'collisions.csv' index k using 5:3 skip (k == 0 ? 1 : 0) with linespoints title word('elastic damped plastic cohesive', k+1)\n"
+          "set output 'collisions-step.svg'\nset xlabel 'dt / dt_crit'\n"
+          "plot for [k=0:3] 'collisions.csv' index k using 2:3 skip (k == 0 ? 1 : 0) with linespoints title word('elastic damped plastic cohesive', k+1), x*x title 'second order' dashtype 2 lc 'grey', 0.1*x title 'first order' dashtype 3 lc 'grey'\n"
+          "unset logscale\n";
+  struct Axis {
+    const char *part, *label;
+  };
   for (const Quantity& q : quantities) {
     if (!crush && std::string(q.key) == "strength") continue;
-    const auto rows = [&](const char* what) { return fmt::format("'bulk.csv' using (strcol(1) eq '{}' && strcol(4) eq '{}' && column(5) != 0 ? column(8) : NaN)", what, q.key); };
-    gp << fmt::format("set logscale y\nset format y '%.0e'\nset output 'work-{}.svg'\nset xlabel 'wall time (s)'\nset ylabel '|difference| of {}'\n"
-                      "plot {}:(abs(column(5))):(2*column(6)) skip 1 with yerrorlines title 'step, twice the standard error', {}:(abs(column(5))):(2*column(6)) skip 1 with yerrorlines title 'plate speed', "
-                      "{}:7 skip 1 with lines lc 'grey' title 'scatter between seeds', {}:(column(7)/2) skip 1 with lines dashtype 2 lc 'grey' title 'half of it'\nunset logscale y\nset format y '%g'\n",
-                      q.key, q.name, rows("step"), rows("speed"), rows("step"), rows("step"));
+    const auto rows = [&](const char* part, const char* x) {
+      return fmt::format("'bulk.csv' using (strcol(1) eq '{}' && strcol(4) eq '{}' ? {} : NaN)", part, q.key, x);
+    };
+    gp << "set format y '%g'\n";
+    for (const Axis& axis : {Axis{"step", "dt / dt_crit"}, Axis{"auto", "safety of the automatic step (0: the smallest fixed one)"}, Axis{"speed", "plate speed (m/s)"}, Axis{"scale", "R (m)"}}) {
+      if (!asked(axis.part)) continue;
+      const std::string points = rows(axis.part, "column(2)");
+      gp << fmt::format("set output 'bulk-{}-{}.svg'\nset title '{}'\nset xlabel '{}'\nset ylabel 'difference'\n"
+                        "plot {}:5:6 skip 1 with yerrorlines title 'difference to the reference, standard error', {}:7 skip 1 with lines lc 'grey' title 'scatter between seeds', "
+                        "{}:(-column(7)) skip 1 with lines lc 'grey' notitle\n",
+                        axis.part, q.key, q.name, axis.label, points, points, points);
+    }
+    // Work against precision: every setting of a part is a point of its line.
+    std::string lines, scatter;
+    for (const Axis& axis : {Axis{"step", "fixed step"}, Axis{"auto", "automatic step"}, Axis{"speed", "plate speed"}}) {
+      if (!asked(axis.part)) continue;
+      const std::string points = rows(axis.part, "column(5) != 0 ? column(8) : NaN");
+      if (scatter.empty()) scatter = fmt::format("{}:7 skip 1 with lines lc 'grey' title 'scatter between seeds', {}:(column(7)/2) skip 1 with lines dashtype 2 lc 'grey' title 'half of it'", points, points);
+      lines += fmt::format("{}:(abs(column(5))):(2*column(6)) skip 1 with yerrorbars title '{}, twice the standard error', ", points, axis.label);
+    }
+    if (!lines.empty())
+      gp << fmt::format("set output 'work-{}.svg'\nset title '{}'\nset xlabel 'wall time (s)'\nset ylabel '|difference|'\nset yrange [0:*]\nplot {}{}\nset yrange [*:*]\n", q.key, q.name, lines, scatter);
   }
-  gp << "set logscale y\nset format y '%.0e'\nset output 'energy.svg'\nset xlabel 'dt / dt_crit'\nset ylabel 'ledger residual / dissipated energy'\n"
-        "plot 'bulk.csv' using (strcol(1) eq 'step' && strcol(4) eq 'energy' ? column(2) : NaN):3 skip 1 with linespoints notitle\n";
+  if (asked("step"))
+    gp << "set logscale y\nset format y '%.0e'\nset output 'energy.svg'\nset title 'energy ledger'\nset xlabel 'dt / dt_crit'\nset ylabel 'ledger residual / dissipated energy'\n"
+          "plot 'bulk.csv' using (strcol(1) eq 'step' && strcol(4) eq 'energy' ? column(2) : NaN):3 skip 1 with linespoints notitle\n";
   gp.close();
   const std::string command = "cd '" + folder.string() + "' && gnuplot plots.gp";
   if (std::system(command.c_str()) != 0) std::fprintf(stderr, "bench_accuracy: gnuplot did not run; plots.gp is there\n");
@@ -217,7 +231,7 @@ int main(int argc, char** argv) {
     std::ofstream(folder / "accuracy.json") << nlohmann::json{{"bench", "accuracy"}, {"case", name}, {"quick", quick}, {"processor", processor_name()}, {"dt_crit", dt_crit},
                                                               {"seeds", beds}, {"collisions", collision_rows}, {"bulk", rows}, {"runs", figures}}.dump(1) << "\n";
     std::ofstream(folder / "recommendation.md") << report;
-    plot(folder, crush);
+    plot(folder, crush, parts);
     std::fputs(report.c_str(), stdout);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "bench_accuracy: %s\n", error.what());
