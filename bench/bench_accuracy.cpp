@@ -123,7 +123,7 @@ void plot(const fs::path& folder, bool crush, const std::vector<std::string>& pa
       lines += fmt::format("{}:(abs(column(5))):(2*column(6)) skip 1 with yerrorbars title '{}, twice the standard error', ", points, axis.label);
     }
     if (!lines.empty())
-      gp << fmt::format("set output 'work-{}.svg'\nset title '{}'\nset xlabel 'wall time (s)'\nset ylabel '|difference|'\nset yrange [0:*]\nplot {}{}\nset yrange [*:*]\n", q.key, q.name, lines, scatter);
+      gp << fmt::format("set output 'work-{}.svg'\nset title '{}'\nset xlabel 'cost of a run (1e9 particle-steps)'\nset ylabel '|difference|'\nset yrange [0:*]\nplot {}{}\nset yrange [*:*]\n", q.key, q.name, lines, scatter);
   }
   if (asked("step"))
     gp << "set logscale y\nset format y '%.0e'\nset output 'energy.svg'\nset title 'energy ledger'\nset xlabel 'dt / dt_crit'\nset ylabel 'ledger residual / dissipated energy'\n"
@@ -196,9 +196,9 @@ int main(int argc, char** argv) {
       report += "## " + title + "\n\n" + verdict_table(head, verdicts, *chosen.front(), figures, value) + "\n";
       for (const Verdict& v : verdicts)
         rows.push_back({{"what", what}, {"setting", v.setting->name}, {"value", v.setting->value}, {"quantity", v.quantity}, {"mean", v.mean}, {"difference", v.difference},
-                        {"standard_error", v.error}, {"seed_scatter", v.scatter}, {"seconds", seconds_of(figures, *v.setting).mean}, {"complete", v.complete}});
+                        {"standard_error", v.error}, {"seed_scatter", v.scatter}, {"work", work_of(figures, *v.setting)}, {"seconds", seconds_of(figures, *v.setting).mean}, {"complete", v.complete}});
       for (const Setting* v : chosen)
-        rows.push_back({{"what", what}, {"setting", v->name}, {"value", v->value}, {"quantity", "energy"}, {"mean", moments(column(figures, v->name, "energy")).mean}, {"seconds", seconds_of(figures, *v).mean}});
+        rows.push_back({{"what", what}, {"setting", v->name}, {"value", v->value}, {"quantity", "energy"}, {"mean", moments(column(figures, v->name, "energy")).mean}, {"work", work_of(figures, *v)}, {"seconds", seconds_of(figures, *v).mean}});
       // The slowest plates are no candidate: their own step's error is not in their difference of 0.
       // A step fixed for all spheres and all stages is nobody's choice; the automatic one of that cost is.
       for (const Verdict& v : verdicts)
@@ -222,11 +222,11 @@ int main(int argc, char** argv) {
     if (!all.empty()) report += "## If you accept ... the fastest setting measured is\n\n" + recommendation_table(all, figures, crush);
 
     std::ofstream csv(folder / "bulk.csv");
-    csv << "what,value,mean,quantity,difference,standard error,seed scatter,seconds\n";
+    csv << "what,value,mean,quantity,difference,standard error,seed scatter,work [1e9 particle-steps],seconds\n";
     const auto cell = [](const nlohmann::json& row, const char* key) { return row.contains(key) && row[key].is_number() ? fmt::format("{:.8g}", row[key].get<double>()) : std::string("nan"); };
     for (const auto& row : rows)
       csv << row["what"].get<std::string>() << "," << cell(row, "value") << "," << cell(row, "mean") << "," << row["quantity"].get<std::string>() << "," << cell(row, "difference") << ","
-          << cell(row, "standard_error") << "," << cell(row, "seed_scatter") << "," << cell(row, "seconds") << "\n";
+          << cell(row, "standard_error") << "," << cell(row, "seed_scatter") << "," << cell(row, "work") << "," << cell(row, "seconds") << "\n";
     csv.close();
     std::ofstream(folder / "accuracy.json") << nlohmann::json{{"bench", "accuracy"}, {"case", name}, {"quick", quick}, {"processor", processor_name()}, {"dt_crit", dt_crit},
                                                               {"seeds", beds}, {"collisions", collision_rows}, {"bulk", rows}, {"runs", figures}}.dump(1) << "\n";

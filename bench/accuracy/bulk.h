@@ -128,10 +128,11 @@ inline void write_bed(const std::filesystem::path& run, const std::filesystem::p
 // Figures of one run; NaN where the run did not get so far.
 inline std::map<std::string, double> bulk_figures(const std::filesystem::path& run) {
   std::map<std::string, double> r;
-  for (const char* key : {"strain", "porosity", "coordination_number", "strength", "energy", "dt", "seconds", "exit_code"}) r[key] = std::nan("");
+  for (const char* key : {"strain", "porosity", "coordination_number", "strength", "energy", "dt", "work", "seconds", "exit_code"}) r[key] = std::nan("");
   const nlohmann::json summary = summary_of(run);
   if (!summary.is_object()) return r;
   r["exit_code"] = summary.value("exit_code", -1);
+  r["work"] = 1e-9 * summary.at("performance").value("particle_steps", std::nan(""));  // [1e9 particle-steps]
   r["seconds"] = summary.at("performance").value("wall_seconds", std::nan(""));
   for (const auto& stage : summary.at("stages")) {
     const auto& values = stage.at("values");

@@ -79,6 +79,8 @@ inline std::vector<Verdict> judge(const std::vector<const Setting*>& settings, c
   return verdicts;
 }
 
+// What a setting costs: particle-steps, which unlike seconds do not depend on what else the machine does [1e9].
+inline double work_of(const Figures& figures, const Setting& v) { return moments(column(figures, v.name, "work")).mean; }
 inline Moments seconds_of(const Figures& figures, const Setting& v) { return moments(column(figures, v.name, "seconds")); }
 
 // The part's table; `value` prints what varies.
@@ -87,7 +89,7 @@ std::string verdict_table(const std::string& head, const std::vector<Verdict>& v
   std::string lines = "| " + head + " |", rule = "|---|";
   for (const Quantity& q : quantities)
     if (std::any_of(verdicts.begin(), verdicts.end(), [&](const Verdict& v) { return q.key == std::string(v.quantity); })) lines += fmt::format(" {} |", q.name), rule += "---|";
-  lines += " bound / scatter | ledger residual / dissipated | wall time (s) | below |\n" + rule + "---|---|---|---|\n";
+  lines += " bound / scatter | ledger residual / dissipated | 1e9 particle-steps | wall time (s) | below |\n" + rule + "---|---|---|---|---|\n";
   for (std::size_t k = 0; k < verdicts.size();) {
     const Setting& v = *verdicts[k].setting;
     lines += "| " + value(v) + " |";
@@ -100,8 +102,8 @@ std::string verdict_table(const std::string& head, const std::vector<Verdict>& v
       worst = std::max(worst, r.bound() / r.scatter);
       complete = complete && r.complete;
     }
-    lines += fmt::format(" {} | {:.1e} | {:.1f} | {} |\n", &v == &reference ? "" : complete ? fmt::format("{:.2f}", worst) : "", moments(column(figures, v.name, "energy")).mean,
-                         seconds_of(figures, v).mean,
+    lines += fmt::format(" {} | {:.1e} | {:.3f} | {:.1f} | {} |\n", &v == &reference ? "" : complete ? fmt::format("{:.2f}", worst) : "", moments(column(figures, v.name, "energy")).mean,
+                         work_of(figures, v), seconds_of(figures, v).mean,
                          &v == &reference ? "reference" : !complete ? "runs failed" : worst < 0.2 ? "a fifth" : worst < 0.5 ? "half" : worst < 1.0 ? "the scatter" : "no");
   }
   return lines;
@@ -109,18 +111,18 @@ std::string verdict_table(const std::string& head, const std::vector<Verdict>& v
 
 // For each quantity and each error that a user may accept: the fastest setting whose bound stays below it.
 inline std::string recommendation_table(const std::vector<Verdict>& verdicts, const Figures& figures, bool crush) {
-  std::string lines = "| quantity | error accepted | fastest setting | wall time (s) | bound of its error |\n|---|---|---|---|---|\n";
+  std::string lines = "| quantity | error accepted | fastest setting | 1e9 particle-steps | bound of its error |\n|---|---|---|---|---|\n";
   for (const Quantity& q : quantities) {
     if (!crush && std::string(q.key) == "strength") continue;
     for (const double accepted : {0.005, 0.01, 0.02, 0.05}) {
       const Verdict* best = nullptr;
       for (const Verdict& v : verdicts) {
         if (q.key != std::string(v.quantity) || !v.complete || v.bound() > accepted * std::fabs(v.mean)) continue;
-        if (!best || seconds_of(figures, *v.setting).mean < seconds_of(figures, *best->setting).mean) best = &v;
+        if (!best || work_of(figures, *v.setting) < work_of(figures, *best->setting)) best = &v;
       }
       if (!best) lines += fmt::format("| {} | {:g} % | none of those measured | | |\n", q.name, 100 * accepted);
-      else lines += fmt::format("| {} | {:g} % | {}, plates at {:g} mm/s | {:.1f} | {:.2f} % |\n", q.name, 100 * accepted, best->setting->automatic ? fmt::format("safety {:g}", best->setting->share) : fmt::format("dt = {:g} dt_crit", best->setting->share), 1e3 * best->setting->speed,
-                                seconds_of(figures, *best->setting).mean, 100 * best->bound() / std::fabs(best->mean));
+      else lines += fmt::format("| {} | {:g} % | {}, plates at {:g} mm/s | {:.3f} | {:.2f} % |\n", q.name, 100 * accepted, best->setting->automatic ? fmt::format("safety {:g}", best->setting->share) : fmt::format("dt = {:g} dt_crit", best->setting->share), 1e3 * best->setting->speed,
+                                work_of(figures, *best->setting), 100 * best->bound() / std::fabs(best->mean));
     }
   }
   return lines;
