@@ -199,10 +199,10 @@ int main(int argc, char** argv) {
                         {"standard_error", v.error}, {"seed_scatter", v.scatter}, {"work", work_of(figures, *v.setting)}, {"seconds", seconds_of(figures, *v.setting).mean}, {"complete", v.complete}});
       for (const Setting* v : chosen)
         rows.push_back({{"what", what}, {"setting", v->name}, {"value", v->value}, {"quantity", "energy"}, {"mean", moments(column(figures, v->name, "energy")).mean}, {"work", work_of(figures, *v)}, {"seconds", seconds_of(figures, *v).mean}});
-      // The slowest plates are no candidate: their own step's error is not in their difference of 0.
-      // A step fixed for all spheres and all stages is nobody's choice; the automatic one of that cost is.
+      // A reference is no candidate: its own error is not in its difference of 0. A step fixed for all stages is nobody's
+      // choice; the automatic one of that cost is.
       for (const Verdict& v : verdicts)
-        if (what == "auto" || (what == "speed" && v.setting != chosen.front())) all.push_back(v);
+        if ((what == "auto" || what == "speed") && v.setting != chosen.front()) all.push_back(v);
     };
     report += fmt::format("\ndt_crit = {:.4g} s (before contacts exist), {:g} kPa. Differences: mean ± standard error. The bound is |mean| + 2 standard errors of the quantity that is farthest off, "
                           "over the scatter between seeds of the reference.\n\n", dt_crit, 1e-3 * size.stress);

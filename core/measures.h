@@ -42,7 +42,8 @@ struct Measures {
   double weight = 0.0;                // [N]
   double energy_residual = 0.0;       // [J]
   double highest_point = 0.0;         // highest z of any sphere's surface [m]
-  double farthest = 0.0;              // largest coordinate of any centre, without its sign [m]; NaN where one is none
+  double farthest = 0.0;              // largest coordinate of any centre, without its sign [m]; NaN where a position or velocity is none
+  double fastest_spin = 0.0;          // [rad/s]
   double deepest_overlap = 0.0;       // of two spheres, over the diameter of the smaller; with stored energies only
   bool top_touches = false;           // a sphere touches the top plate
   Ledger ledger;

@@ -113,7 +113,8 @@ Measures Simulation::measure(bool stored_energies) {
     FixedSum kinetic, rolled, potential, plate_energy, support, top, bottom, weight;
     double highest = -std::numeric_limits<double>::infinity(), farthest = 0.0;
     PairSums pairs;
-    bool touches = false, lost = false;  // lost: a position is not a number
+    double fastest_turn = 0.0;           // [rad/s]
+    bool touches = false, lost = false;  // lost: a position or velocity is not a number
     Part(double energy, double force)
         : kinetic(energy), rolled(energy), potential(energy), plate_energy(energy), support(force), top(force), bottom(force),
           weight(force), pairs(energy) {}
@@ -147,7 +148,8 @@ Measures Simulation::measure(bool stored_energies) {
       part.weight.add(m * gravity_);
       part.highest = std::max(part.highest, p.z[k] + R);
       part.farthest = std::max({part.farthest, std::fabs(p.x[k]), std::fabs(p.y[k]), std::fabs(p.z[k])});
-      part.lost = part.lost || !std::isfinite(p.x[k] + p.y[k] + p.z[k]);
+      part.lost = part.lost || !std::isfinite(p.x[k] + p.y[k] + p.z[k] + v[0] + v[1] + v[2] + turning2);
+      part.fastest_turn = std::max(part.fastest_turn, std::sqrt(p.ux[k] * p.ux[k] + p.uy[k] * p.uy[k] + p.uz[k] * p.uz[k]) / R);
     }
     if (stored_energies) add_pairs(b, p, domain_, law_, part.pairs);
     for (int plate = 0; plate < plate_count; ++plate) {
@@ -170,6 +172,7 @@ Measures Simulation::measure(bool stored_energies) {
     all.highest = std::max(all.highest, part.highest);
     all.farthest = std::max(all.farthest, part.farthest);
     all.lost = all.lost || part.lost;
+    all.fastest_turn = std::max(all.fastest_turn, part.fastest_turn);
     all.pairs.deepest = std::max(all.pairs.deepest, part.pairs.deepest);
     all.touches = all.touches || part.touches;
   }
@@ -181,6 +184,7 @@ Measures Simulation::measure(bool stored_energies) {
   const double z_top = top ? plane_position(plate_top) : all.highest;
   r.highest_point = all.highest;
   r.farthest = all.lost ? std::numeric_limits<double>::quiet_NaN() : all.farthest;
+  r.fastest_spin = all.fastest_turn;
   r.deepest_overlap = all.pairs.deepest;
   r.top_touches = all.touches;
   r.height = (top && (all.touches || z_top < all.highest) ? z_top : all.highest) - z_bottom;
@@ -281,7 +285,7 @@ Snapshot Simulation::snapshot(bool with_contacts) {
     const double power = overlap_power(law_, s.delta), elastic = law_.k2 * (power - b.sp[k]);
     const double K1 = loading_slope(law_, s.delta), k_t = law_.ratio * K1;
     const double beta_n = std::sqrt(law_.damping * s.m_eff * K1), beta_t = beta_n * law_.beta_ratio;
-    const double limit = law_.mu * std::fabs(elastic + law_.k_adh * power);
+    const double limit = law_.mu * std::fabs((elastic + law_.limit_f) + law_.limit_k * power);
     // Forces saw the velocities of the half step before.
     const double l_i = 1.0 - 0.5 * s.delta / s.R_i, l_j = 1.0 - 0.5 * s.delta / s.R_j;
     const double v[3] = {p.vx[a] - p.vx[d], p.vy[a] - p.vy[d], p.vz[a] - p.vz[d]};

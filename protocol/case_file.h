@@ -63,7 +63,7 @@ struct BoxSpec {
 
 struct TimeSpec {
   std::optional<double> step;  // fixed step [s]; empty = "auto"
-  double safety = 0.4;  // justified in docs/accuracy.md
+  double safety = 0.3;  // justified in docs/accuracy.md
   bool allow_unstable = false;
 };
 

@@ -147,6 +147,8 @@ class Experiment {
   // The automatic step, or the watch over a fixed one.
   void watch_time_step(Stand& stand, const Measures& m) {
     const StepLimits limits = sim_->step_limits();
+    if (!c_.time.step && sim_->time_step() > 0.9 * limits.dt_limit)  // before this look, that is
+      warn(sim_->time_step() > limits.dt_limit ? "time step above dt_limit for a while" : "time step above 0.9 dt_limit for a while");
     StepRange& range = current_.time_step;
     range.dt_crit = std::min(range.dt_crit, limits.dt_crit), range.dt_limit = std::min(range.dt_limit, limits.dt_limit);
     if (std::isfinite(limits.dt_limit))
@@ -163,7 +165,14 @@ class Experiment {
     const StepLimits free = first_step(c_).limits;
     // A loose bed says nothing of the dense one that it is about to become.
     if (m.coordination_number < 3.0) ruling.dt_crit = std::min(ruling.dt_crit, free.dt_crit), ruling.dt_limit = std::min(ruling.dt_limit, free.dt_limit);
-    sim_->set_time_step(floor_to_grid(std::min(c_.time.safety * ruling.dt_crit, 0.8 * ruling.dt_limit)));
+    const StageKind kind = current_.kind;
+    const double wanted = floor_to_grid(std::min(safety_of(c_, kind) * ruling.dt_crit, 0.8 * ruling.dt_limit));
+    // Shorter at once, longer only where two looks in a row allow it, and never while spheres fall or are shaken: a bed in the
+    // air allows a step that its next impact does not.
+    const double now = sim_->time_step(), allowed = std::min(wanted, last_wanted_.value_or(wanted));
+    last_wanted_ = wanted;
+    const bool loose = kind == StageKind::fill || kind == StageKind::vibrate;
+    sim_->set_time_step(loose ? std::min(now, wanted) : allowed);
     stand.time_step_changed();
   }
 
@@ -189,6 +198,7 @@ class Experiment {
     current_.first_step = sim_->step(), current_.time_begin = sim_->time();
     current_.particles = sim_->particles();
     stage_open_ = true;
+    last_wanted_.reset();
 
     Stand stand{*sim_, c_, spec, sim_->step(), sim_->time(), strain_zero_height_, sim_->step(), 0.0};
     Stage stage = make_stage(spec);
@@ -197,6 +207,7 @@ class Experiment {
     strain_zero_height_ = stand.strain_zero_height;
     const double speed = spec.speed;
     sample(index, speed);
+    const double residual_before = current_.last.measures.energy_residual, dissipated_before = current_.last.measures.ledger.dissipated();
 
     End end = End::done;
     std::int64_t next_sample = sim_->step() + steps_to_sample();
@@ -248,6 +259,10 @@ class Experiment {
     }
 
     sample(index, speed);
+    const Measures& m = current_.last.measures;
+    const double dissipated = m.ledger.dissipated();
+    current_.residual_share = !c_.output.energy ? std::numeric_limits<double>::quiet_NaN() : (m.energy_residual - residual_before) / std::max(dissipated - dissipated_before, 0.01 * dissipated);
+    if (std::fabs(current_.residual_share) > 0.01) warn(fmt::format("the energy ledger is open by {:.2g} % of what was dissipated; a smaller time step closes it", 100.0 * std::fabs(current_.residual_share)));
     close(index, stand, stage, stage_begin, end);
     return end;
   }
@@ -262,6 +277,7 @@ class Experiment {
       const StepLimits limits = sim_->step_limits(current_.time_step.ruled_by);
       current_.time_step.dt_crit = std::min(current_.time_step.dt_crit, limits.dt_crit);
       current_.time_step.dt_limit = std::min(current_.time_step.dt_limit, limits.dt_limit);
+      if (c_.time.step && sim_->time_step() > 0.9 * limits.dt_limit) warn(sim_->time_step() > limits.dt_limit ? "time step above dt_limit" : "time step above 0.9 dt_limit");
       std::visit([&](auto& s) { s.end(stand, current_); }, stage);
     }
     closed_.push_back(current_);
@@ -281,12 +297,13 @@ class Experiment {
 
   // Things that must not go unnoticed although every number is still finite.
   void guard(const Measures& m) {
-    if (!std::isfinite(m.kinetic_energy) || !std::isfinite(m.potential_energy))
-      throw RunError(fmt::format("energy is not a number at step {}{}; a smaller time step or lower speeds help", m.step, farthest_sphere()));
+    if (m.fastest_spin * sim_->time_step() > 0.5)
+      throw RunError(fmt::format("a sphere turns by {:.3g} rad in one step at step {} (t = {:.6g} s): more than springs and rolling can follow{}; use a smaller time step",
+                                 m.fastest_spin * sim_->time_step(), m.step, m.time, fastest_turning_sphere()));
     if (!(m.farthest <= farthest_allowed_))
       throw RunError(fmt::format("a sphere is lost at step {} (t = {:.6g} s){}: {}; plates, walls or periodic sides keep spheres in, a smaller time step or lower speeds keep them slow",
                                  m.step, m.time, farthest_sphere(),
-                                 std::isnan(m.farthest) ? std::string("its position is not a number") : fmt::format("farther out than 1000 times the box, {:.4g} m", farthest_allowed_)));
+                                 std::isnan(m.farthest) ? std::string("a position or velocity is not a number") : fmt::format("farther out than 1000 times the box, {:.4g} m", farthest_allowed_)));
     const bool quasi_static = current_.kind == StageKind::compress || current_.kind == StageKind::crush;
     if (quasi_static && m.stress_top > 1e3) {
       const double I = row_of(m, c_.stages[closed_.size()].speed).inertial_number;
@@ -310,13 +327,26 @@ class Experiment {
     for (const std::int32_t& place : p.place) {
       const auto k = static_cast<std::size_t>(place);
       const double sum = std::fabs(p.x[k]) + std::fabs(p.y[k]) + std::fabs(p.z[k]);
-      const double far = std::isfinite(sum) ? sum : std::numeric_limits<double>::infinity();
+      const double all = sum + p.vx[k] + p.vy[k] + p.vz[k] + p.ux[k] + p.uy[k] + p.uz[k];
+      const double far = std::isfinite(all) ? sum : std::numeric_limits<double>::infinity();
       if (far > most) most = far, found = &place;
     }
     if (!found) return "";
     const auto k = static_cast<std::size_t>(*found);
     return fmt::format("; sphere {} at ({:g}, {:g}, {:g}) m moves at ({:g}, {:g}, {:g}) m/s", p.id_of_rank[static_cast<std::size_t>(found - p.place.data())],
                        p.x[k], p.y[k], p.z[k], p.vx[k], p.vy[k], p.vz[k]);
+  }
+
+  std::string fastest_turning_sphere() const {
+    const Particles& p = sim_->state();
+    std::string text;
+    double most = -1.0;
+    for (std::size_t rank = 0; rank < p.place.size(); ++rank) {
+      const auto k = static_cast<std::size_t>(p.place[rank]);
+      const double spin = std::sqrt(p.ux[k] * p.ux[k] + p.uy[k] * p.uy[k] + p.uz[k] * p.uz[k]) / p.radius_of(p.place[rank]);
+      if (spin > most) most = spin, text = fmt::format("; sphere {} at ({:g}, {:g}, {:g}) m turns at {:g} rad/s", p.id_of_rank[rank], p.x[k], p.y[k], p.z[k], spin);
+    }
+    return text;
   }
 
   void show_progress(std::size_t index, const Stand& stand, const std::optional<std::int64_t>& exact, double stage_begin) {
@@ -353,6 +383,7 @@ class Experiment {
   StageResult current_;
   bool stage_open_ = false;
   std::optional<double> strain_zero_height_;
+  std::optional<double> last_wanted_;  // step that the look before allowed; empty at the start of a stage [s]
   double farthest_allowed_ = std::numeric_limits<double>::infinity();  // of any coordinate [m]
   double looked_stress_ = 0.0, looked_contacts_ = 0.0;  // largest at looks at the limits since the last regular one
   double last_progress_ = 0.0;

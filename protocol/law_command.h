@@ -15,7 +15,7 @@ struct LawRow {
   double overlap = 0.0;          // delta [m], as given
   double f_hys = 0.0;            // spring force, positive repels [N]
   double plastic_overlap = 0.0;  // delta_p after the step [m]
-  double friction_limit = 0.0;   // mu |f_hys + k_adh s - f0| between spheres, mu F at a plate [N]
+  double friction_limit = 0.0;   // mu |f_hys + k_adh s - f0| or mu |f_hys| between spheres, mu F at a plate [N]
   Branch branch = Branch::none;  // of Eq. 2 with the history as it was before this step
 };
 

@@ -89,7 +89,9 @@ std::string stage_line(const StageResult& stage, int number, int stages) {
                                  1e-3 * m.stress_top);
   if (std::isfinite(stage.last.strain)) line += fmt::format(", strain {:.2f} %", 100.0 * stage.last.strain);
   if (std::isfinite(m.porosity)) line += fmt::format(", porosity {:.3f}", m.porosity);
-  return line + fmt::format(", CN {:.2f}\n", m.coordination_number);
+  line += fmt::format(", CN {:.2f}", m.coordination_number);
+  if (std::isfinite(stage.residual_share)) line += fmt::format(", energy open by {:.2g} %", 100.0 * std::fabs(stage.residual_share));
+  return line + "\n";
 }
 
 ProgressPrinter::ProgressPrinter(std::FILE* stream, Style style, std::vector<std::string> stages)

@@ -28,7 +28,7 @@ TEST(CaseFile, GoodCaseWithDefaults) {
   EXPECT_TRUE(c.box.given);
   EXPECT_EQ(c.gravity, 9.81);
   EXPECT_FALSE(c.time.step);
-  EXPECT_EQ(c.time.safety, 0.4);
+  EXPECT_EQ(c.time.safety, 0.3);
   EXPECT_FALSE(c.output.frames);
   EXPECT_EQ(c.output.checkpoint, 60.0);
   EXPECT_FALSE(c.engine.skin || c.engine.inner_gap || c.engine.batch);

@@ -119,5 +119,28 @@ TEST(Engine, FollowsTheReferenceStepByStep) {
       }
 }
 
+// What a snapshot says of a sliding contact is what the kernel used, for both friction limits.
+TEST(Engine, ASlidingContactHasTheForceOfItsLimit) {
+  for (const FrictionLimit kind : {FrictionLimit::adhesive, FrictionLimit::normal}) {
+    PairLaw law = scenes::full_law();
+    law.friction = 0.01, law.friction_limit = kind;  // most slide
+    EngineOptions engine;
+    BedOptions options;
+    Simulation sim(scenes::bed(options, law, engine));
+    sim.set_time_step(2e-6);
+    sim.advance(100);
+    const ContactFields c = sim.snapshot().contacts;
+    ASSERT_GT(c.size(), 60u);
+    std::size_t sliding = 0;
+    for (std::size_t k = 0; k < c.size(); ++k) {
+      const double* t = &c.tangential_force[3 * k];
+      const double force = std::sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]);
+      const double height = kind == FrictionLimit::normal ? c.normal_force[k] : c.normal_force[k] - law.f0 + law.k_adh * c.overlap[k];
+      sliding += std::fabs(force - law.friction * std::fabs(height)) < 1e-12;
+    }
+    EXPECT_GT(sliding, c.size() * 3 / 4) << sliding << " of " << c.size();
+  }
+}
+
 }  // namespace
 }  // namespace platen

@@ -249,6 +249,24 @@ TEST(TimeStep, AutoStaysBelowItsLimitsAndChangesOnTheGrid) {
   }
 }
 
+// In the air a shaken bed allows a step that its next impact does not.
+TEST(TimeStep, AShakenBedStaysBelowItsLimits) {
+  const std::string shake = "[[stage]]\nkind = \"vibrate\"\nfrequency = 60\namplitude = \"1.5 mm\"\nduration = \"0.2 s\"\n";
+  const Trial run = run_case(small_bed + fill + shake + time_passes("20 ms"), {"time.step=\"auto\"", "particles.law.k_adh=0", "particles.count=150"});
+  ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
+  std::istringstream log(read_file(run.path() / "log.jsonl"));
+  int looks = 0;
+  for (std::string line; std::getline(log, line);) {
+    const auto event = nlohmann::json::parse(line);
+    if (event["event"] != "limits") continue;
+    ++looks;
+    EXPECT_LT(event["dt"].get<double>(), event["dt_limit"].get<double>()) << line;
+  }
+  EXPECT_GT(looks, 3);
+  for (const auto& stage : summary(run)["stages"])
+    for (const auto& warning : stage["warnings"]) EXPECT_EQ(warning.get<std::string>().find("above dt_limit"), std::string::npos) << stage["name"];
+}
+
 TEST(TimeStep, AFixedStepAboveTheLimitIsRefused) {
   const auto parse = [](const std::string& step, const std::string& allow = "false") {
     return parse_case(small_bed + fill, "case.toml", ".", {"time.step=" + step, "time.allow_unstable=" + allow});

@@ -137,6 +137,16 @@ TEST(Guards, ASphereLostInOpenSpace) {
   EXPECT_NE(said.find("periodic sides keep spheres in"), std::string::npos) << said;
 }
 
+TEST(Guards, ASpinThatNoStepCanFollow) {
+  const std::string table = "id,x,y,z,wx\n3,0,0,0,0\n8,0.01,0.02,0,30000\n";
+  const Trial run = run_case(table_case(time_passes("50 ms")), {"time.step=\"20 us\""}, {}, table);
+  EXPECT_EQ(run.outcome.exit_code, exit_numerical);
+  const std::string& said = run.outcome.message;
+  EXPECT_NE(said.find("a sphere turns by 0.6 rad in one step at step "), std::string::npos) << said;
+  EXPECT_NE(said.find("; sphere 8 at (0.01, 0.02, 0) m turns at 30000 rad/s"), std::string::npos) << said;
+  EXPECT_NE(said.find("use a smaller time step"), std::string::npos) << said;
+}
+
 TEST(Guards, AnOverlapAboveAQuarterOfTheDiameterIsTold) {
   const std::string below = "id,x,y,z\n3,0,0,0\n5,0.0039,0,0\n";
   const auto warnings = [](const std::string& spheres) {

@@ -40,7 +40,7 @@ struct BulkSize {
   std::vector<double> safeties;  // of the automatic step
   std::vector<double> speeds;  // [m/s], slowest first: the reference
   std::vector<double> radii;   // [m], finest first: the reference
-  double safety = 0.4;         // of the automatic step, in all parts but the two on steps
+  double safety = 0.3;         // of the automatic step, in all parts but the two on steps
   double bed_share = 0.1, vibration = 1.0;  // [s]
   bool strict = true;          // settle by the experiment's own criterion
 };

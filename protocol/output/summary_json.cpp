@@ -48,6 +48,7 @@ Json stage_json(const StageResult& s) {
   set(stage, "initial_stiffness", s.initial_stiffness);
   if (s.peak_found) stage["peak_found"] = *s.peak_found;
   set(stage, "energy_residual", s.last.measures.energy_residual);
+  set(stage, "energy_residual_share", s.residual_share);
   Json step = Json::object();
   if (s.time_step.largest > 0.0) set(step, "smallest", s.time_step.smallest), set(step, "largest", s.time_step.largest);
   set(step, "smallest_dt_crit", s.time_step.dt_crit), set(step, "smallest_dt_limit", s.time_step.dt_limit);
