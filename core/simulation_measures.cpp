@@ -406,37 +406,54 @@ StepLimits Simulation::limits_of_network(std::string* ruled_by) {
 void Simulation::fail(const std::string& what) {
   std::string text = what + " at step " + std::to_string(step_) + " (t = " + std::to_string(time()) + " s)";
   int named = 0;
-  char line[400];
+  char line[600];
   const auto id = [this](std::int32_t k) {
     return static_cast<long long>(particles_.id_of_rank[static_cast<std::size_t>(particles_.rank[static_cast<std::size_t>(k)])]);
   };
-  for (std::int32_t k = 0; k < particles_.count && named < 3; ++k) {
+  // Spheres that are no numbers or absurdly fast; then the pair that is worst off; then spheres in plates.
+  for (std::int32_t k = 0; k < particles_.count && named < 2; ++k) {
     const auto a = static_cast<std::size_t>(k);
     const double sum = particles_.x[a] + particles_.y[a] + particles_.z[a] + particles_.vx[a] + particles_.vy[a] +
                        particles_.vz[a] + particles_.ux[a] + particles_.uy[a] + particles_.uz[a];
-    if (std::isfinite(sum) && std::fabs(particles_.vx[a]) + std::fabs(particles_.vy[a]) + std::fabs(particles_.vz[a]) < 1e6) continue;
-    std::snprintf(line, sizeof line, "; sphere %lld at (%g, %g, %g) m moves at (%g, %g, %g) m/s", id(k), particles_.x[a],
-                  particles_.y[a], particles_.z[a], particles_.vx[a], particles_.vy[a], particles_.vz[a]);
+    const double speeds = std::fabs(particles_.vx[a]) + std::fabs(particles_.vy[a]) + std::fabs(particles_.vz[a]) + std::fabs(particles_.ux[a]) +
+                          std::fabs(particles_.uy[a]) + std::fabs(particles_.uz[a]);
+    if (std::isfinite(sum) && speeds < 1e6) continue;
+    const double R = particles_.radius_of(k);
+    std::snprintf(line, sizeof line, "; sphere %lld at (%g, %g, %g) m moves at (%g, %g, %g) m/s, turns at (%g, %g, %g) rad/s", id(k), particles_.x[a],
+                  particles_.y[a], particles_.z[a], particles_.vx[a], particles_.vy[a], particles_.vz[a], particles_.ux[a] / R, particles_.uy[a] / R,
+                  particles_.uz[a] / R);
     text += line;
     ++named;
   }
-  double deepest = 0.0;
+  // How near a pair is to what is not credible: overlap over R, forces over their bound; 1 is too much.
+  const Batch* worst_batch = nullptr;
+  std::size_t worst = 0;
+  double severity = 0.5;
   for (const Batch& b : batches_)
-    for (std::size_t k = 0; k < static_cast<std::size_t>(b.used) && named < 3; ++k) {
+    for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k) {
       const PairState s = pair_state(particles_, domain_, b.i[k], b.j[k]);
-      const double ratio = s.delta / std::min(s.R_i, s.R_j);
-      if (!(ratio > 0.5) || ratio < deepest) continue;
-      deepest = ratio;
-      const auto i = static_cast<std::size_t>(b.i[k]), j = static_cast<std::size_t>(b.j[k]);
-      const double approach = (particles_.vx[j] - particles_.vx[i]) * s.n[0] + (particles_.vy[j] - particles_.vy[i]) * s.n[1] +
-                              (particles_.vz[j] - particles_.vz[i]) * s.n[2];
-      const double force = law_.f0 + law_.k2 * (overlap_power(law_, s.delta) - b.sp[k]);
-      std::snprintf(line, sizeof line, "; spheres %lld at (%g, %g, %g) m and %lld overlap by %.2f R (plastic %.2f R), approach at %g m/s, push with %g N",
-                    id(b.i[k]), particles_.x[i], particles_.y[i], particles_.z[i], id(b.j[k]), ratio,
-                    overlap_root(law_, b.sp[k]) / std::min(s.R_i, s.R_j), approach, force);
-      text += line;
-      ++named;
+      if (!(s.delta > 0.0)) continue;
+      const double normal = law_.f0 + law_.k2 * (overlap_power(law_, s.delta) - b.sp[k]);
+      const double spring = std::sqrt(b.tx[k] * b.tx[k] + b.ty[k] * b.ty[k] + b.tz[k] * b.tz[k]);
+      const double here = std::isfinite(normal + spring) ? std::max({s.delta / std::min(s.R_i, s.R_j), std::fabs(normal) / law_.force.bound, spring / law_.force.bound})
+                                                         : std::numeric_limits<double>::infinity();
+      if (here > severity) severity = here, worst_batch = &b, worst = k;
     }
+  if (worst_batch != nullptr) {
+    const Batch& b = *worst_batch;
+    const PairState s = pair_state(particles_, domain_, b.i[worst], b.j[worst]);
+    const auto i = static_cast<std::size_t>(b.i[worst]), j = static_cast<std::size_t>(b.j[worst]);
+    const double R = std::min(s.R_i, s.R_j);
+    const double approach = (particles_.vx[j] - particles_.vx[i]) * s.n[0] + (particles_.vy[j] - particles_.vy[i]) * s.n[1] +
+                            (particles_.vz[j] - particles_.vz[i]) * s.n[2];
+    std::snprintf(line, sizeof line,
+                  "; spheres %lld at (%g, %g, %g) m and %lld at (%g, %g, %g) m overlap by %.2f R (plastic %.2f R), approach at %g m/s, push with %g N, rub with %g N",
+                  id(b.i[worst]), particles_.x[i], particles_.y[i], particles_.z[i], id(b.j[worst]), particles_.x[j], particles_.y[j], particles_.z[j],
+                  s.delta / R, overlap_root(law_, b.sp[worst]) / R, approach, law_.f0 + law_.k2 * (overlap_power(law_, s.delta) - b.sp[worst]),
+                  std::sqrt(b.tx[worst] * b.tx[worst] + b.ty[worst] * b.ty[worst] + b.tz[worst] * b.tz[worst]));
+    text += line;
+    ++named;
+  }
   const auto sphere = [&](std::int32_t k, const char* what_of_it) {
     const auto a = static_cast<std::size_t>(k);
     std::snprintf(line, sizeof line, "; sphere %lld at (%g, %g, %g) m %s", id(k), particles_.x[a], particles_.y[a], particles_.z[a], what_of_it);

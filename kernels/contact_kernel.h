@@ -341,13 +341,13 @@ PLATEN_INLINE ActiveVectors active_vectors(const Chunk<scene>& chunk, const Pair
 // too large or not a number, `too_strong` looks at each.
 template <class I>
 struct Guards {
-  typename I::Real strength2 = I::set(0.0);       // sum of |F|^2 + S^2
+  typename I::Real strength = I::set(0.0);        // sum of |Fx| + |Fy| + |Fz| + S, which is more than the root of |F|^2 + S^2 of any
   typename I::Real lever_i = I::set(1.0), lever_j = I::set(1.0);  // the shortest
 };
 
-// Whether a contact of the chunk is out of its bound [N^2]. Written so that a NaN counts as too strong.
+// Whether a contact of the chunk is out of its bound [N]. Written so that a NaN counts as too strong.
 template <class I, SceneTraits scene>
-bool too_strong(const Chunk<scene>& chunk, const ActiveVectors& active, double bound2) {
+bool too_strong(const Chunk<scene>& chunk, const ActiveVectors& active, double bound) {
   bool strong = false;
   for (int m = 0; m < active.count; ++m) {
     const Vec3<I> F = Chunk<scene>::template take<I>(chunk.F, active.at[m]);
@@ -356,7 +356,7 @@ bool too_strong(const Chunk<scene>& chunk, const ActiveVectors& active, double b
       const typename I::Real S = I::load(chunk.S[0] + active.at[m]);
       strength2 = I::fma(S, S, strength2);
     }
-    strong = strong || I::any(I::negate(strength2 < I::set(bound2)));
+    strong = strong || I::any(I::negate(strength2 < I::set(bound * bound)));
   }
   return strong;
 }
@@ -379,10 +379,10 @@ PLATEN_INLINE bool law_of_chunk(Chunk<scene>& chunk, const PairBatch& b, const L
     chunk.template put_forces<I>(at, forces);
     contacts += I::count(forces.touching);
     if constexpr (guarded) {
-      guards.strength2 = guards.strength2 + I::fma(forces.S_i, forces.S_i, dot(forces.F, forces.F));
-      guards.lever_i = I::min(guards.lever_i, I::where(forces.touching, pairs.lever_i, I::set(1.0)));
-      if constexpr (!scene.equal_spheres)
-        guards.lever_j = I::min(guards.lever_j, I::where(forces.touching, pairs.lever_j, I::set(1.0)));
+      guards.strength = guards.strength + ((I::abs(forces.F.x) + I::abs(forces.F.y)) + (I::abs(forces.F.z) + forces.S_i));
+      // Pairs that are apart have levers above 1, and padding, whose lever is no number, gives the second operand.
+      guards.lever_i = I::min(pairs.lever_i, guards.lever_i);
+      if constexpr (!scene.equal_spheres) guards.lever_j = I::min(pairs.lever_j, guards.lever_j);
     }
     if constexpr (scene.energy) {
       sums.viscous = sums.viscous + rounded<I>(energy.viscous, c.energy);
@@ -394,19 +394,22 @@ PLATEN_INLINE bool law_of_chunk(Chunk<scene>& chunk, const PairBatch& b, const L
   }
   bool fine = true;
   if constexpr (guarded) {
-    const double bound2 = c.force.bound * c.force.bound;
     // An overlap above R, the centre of one sphere deep inside the other, is no contact any more: a lever below R/2.
-    const auto deep = I::either(guards.lever_i < I::set(0.5), guards.lever_j < I::set(0.5));
-    fine = !I::any(deep) && (!I::any(I::negate(guards.strength2 < I::set(bound2))) || !too_strong<I, scene>(chunk, active, bound2));
+    auto deep = guards.lever_i < I::set(0.5);
+    if constexpr (!scene.equal_spheres) deep = I::either(deep, guards.lever_j < I::set(0.5));
+    if (I::any(I::either(deep, I::negate(guards.strength < I::set(c.force.bound))))) fine = !I::any(deep) && !too_strong<I, scene>(chunk, active, c.force.bound);
   }
-  if constexpr (scene.energy)
+  if constexpr (scene.energy) {
+    double size = 0.0;
     for_each_energy<I, scene>(sums, [&](int term, const Real& sum) {
       const double total = I::sum(sum);
-      // Beyond this bound sums are not exact. With forces within theirs a contact would have to move radii in one step, so
-      // that this is met by numbers that are none.
-      if constexpr (guarded) fine = fine && total < chunk_size / 2 * c.energy.bound && total > -(chunk_size / 2 * c.energy.bound);
+      if constexpr (guarded) size += total < 0.0 ? -total : total;
       totals.energy[term] += static_cast<std::int64_t>(total * c.energy.inverse);
     });
+    // Beyond this bound sums are not exact. With forces within theirs a contact would have to move radii in one step, so
+    // that this is met by numbers that are none.
+    if constexpr (guarded) fine = fine && size < chunk_size / 2 * c.energy.bound;
+  }
   totals.contacts += contacts;
   return fine;
 }

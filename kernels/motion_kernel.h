@@ -15,7 +15,7 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
   const Real zero = I::set(0.0), kick = I::set(c.kick), drift = I::set(c.drift);
   Real largest = zero;
   Real rolled = zero;
-  Real squares = zero;  // of all velocities: not a number where one is none
+  Real squares = zero;  // of all velocities: not a number where one is none. Spins show in the forces that they cause
   for (std::int32_t k = 0; k < b.count; k += I::width) {
     typename I::Record records[I::width];
     for (int lane = 0; lane < I::width; ++lane)
@@ -76,7 +76,7 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
     const Vec3<I> excess = {v.x - I::set(c.mean_x), v.y - I::set(c.mean_y), v.z - I::set(c.mean_z)};
     const Real speed2 = dot(excess, excess);
     largest = I::max(largest, speed2 * I::load(b.inverse_room2 + k));
-    if constexpr (guarded) squares = squares + (speed2 + dot(u, u));
+    if constexpr (guarded) squares = squares + speed2;
   }
   const double pace = I::largest(largest);
   totals.largest_pace = totals.largest_pace > pace ? totals.largest_pace : pace;

@@ -85,6 +85,9 @@ TEST(Guards, AForceBeyondAnyCredibleOne) {
         return law;
       }());
       EXPECT_NE(said.find("out of range at step "), std::string::npos) << said;
+      EXPECT_NE(said.find("73 at ("), std::string::npos) << said;
+      EXPECT_NE(said.find("; spheres "), std::string::npos) << said;
+      EXPECT_NE(said.find(" N, rub with "), std::string::npos) << said;
       EXPECT_NE(said.find("a smaller time step"), std::string::npos) << said;
     }
 }
