@@ -1,17 +1,7 @@
-#include "bench/unguarded.h"
-#include "kernels/contact_kernel.h"
-#include "kernels/motion_kernel.h"
+#include "bench/unguarded_kernels.h"
 
 namespace platen::bench {
 
-UnguardedKernels unguarded_avx512() {
-  constexpr SceneTraits full = [] {
-    SceneTraits t = built_scenes[2].traits;
-    t.energy = true;
-    return t;
-  }();
-  static_assert(full.adhesion && full.plasticity && full.equal_spheres && full.rolling == Rolling::absolute);
-  return {&contact_kernel<Avx512, full, false, false>, &motion_kernel<Avx512, true, true, true, false>};
-}
+UnguardedKernels unguarded_avx512() { return unguarded_full<Avx512>(); }
 
 }  // namespace platen::bench

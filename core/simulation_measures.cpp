@@ -392,6 +392,7 @@ StepLimits Simulation::limits_of_network(std::string* ruled_by) {
   }
   StepLimitOptions options;
   options.find_ruling = ruled_by != nullptr;
+  options.pairs_alone = true;
   const StepLimits limits = platen::step_limits(bodies, contacts, {}, options);
   if (ruled_by && limits.ruling_contact >= 0) {
     const auto at = static_cast<std::size_t>(limits.ruling_contact), pairs = contacts.size() - plates.size();

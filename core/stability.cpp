@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <stdexcept>
 #include <string>
@@ -342,6 +343,17 @@ StepLimits step_limits(const std::vector<NetworkBody>& bodies, const std::vector
     limits.ruling_contact = network.stiffest(x);
   }
   limits.operator_passes = network.passes();
+  limits.dt_pairs = limits.dt_crit;
+  if (options.pairs_alone) {
+    std::vector<StiffContact> pairs;
+    std::copy_if(contacts.begin(), contacts.end(), std::back_inserter(pairs), [](const StiffContact& c) { return c.j >= 0; });
+    if (pairs.size() < contacts.size()) {
+      const StepLimits alone = step_limits(bodies, pairs, ids, {.max_iterations = options.max_iterations, .tolerance = options.tolerance, .damped = false});
+      // Both are rounded down by an error bound of their own.
+      limits.dt_pairs = std::max(limits.dt_crit, alone.dt_crit);
+      limits.operator_passes += alone.operator_passes;
+    }
+  }
   return limits;
 }
 
@@ -355,6 +367,7 @@ StepLimits free_limits(double m_min, double k2, double k_t, double c_n, double c
   const double usual = 0.75 * std::sqrt(m_min / k2), cluster = limits.dt_crit;
   limits.dt_crit = std::min(usual, margin * cluster);
   limits.dt_limit *= limits.dt_crit / cluster;
+  limits.dt_pairs = limits.dt_crit;
   limits.omega_max = 2.0 / limits.dt_crit;
   limits.ruling_body = limits.ruling_contact = -1;
   return limits;

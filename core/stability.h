@@ -40,6 +40,8 @@ struct NetworkBody {
 struct StepLimits {
   double dt_crit = std::numeric_limits<double>::infinity();   // 2/omega_max [s]; infinite without contacts
   double dt_limit = std::numeric_limits<double>::infinity();  // the same with the dashpots [s], <= dt_crit
+  double dt_pairs = std::numeric_limits<double>::infinity();  // dt_crit without the contacts to plates and walls [s], >= dt_crit;
+                                                              // dt_crit itself where it is not asked for
   double omega_max = 0.0;                                     // [rad/s]
   int ruling_body = -1;     // body that moves most in the mode that rules dt_limit; -1: none, or not asked for
   int ruling_contact = -1;  // contact that holds most of that mode's energy
@@ -52,6 +54,7 @@ struct StepLimitOptions {
   bool damped = true;        // false: dt_limit is left at dt_crit
   double dt_guess = 0.0;     // a dt_limit found before, which saves about half of the passes; 0: none [s]. The answer
                              // depends on it within the tolerance, so it has to be part of the state
+  bool pairs_alone = false;  // find dt_pairs too, which costs up to max_iterations more passes
   bool find_ruling = false;  // costs up to max_iterations more passes
 };
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "protocol/guards.h"
 #include "protocol/stages.h"
 
 namespace platen {
@@ -29,7 +30,7 @@ class Experiment {
     try {
       sim_ = make_simulation(c_, options_.threads, options_.reproducible);
       describe_run();
-      farthest_allowed_ = 1000.0 * size_of_space();
+      farthest_allowed_ = 1000.0 * size_of_space(c_, *sim_);
       for (std::size_t k = 0; k < c_.stages.size(); ++k) {
         const End end = run_stage(k);
         if (end == End::goal_missed) {
@@ -152,7 +153,7 @@ class Experiment {
     StepRange& range = current_.time_step;
     range.dt_crit = std::min(range.dt_crit, limits.dt_crit), range.dt_limit = std::min(range.dt_limit, limits.dt_limit);
     if (std::isfinite(limits.dt_limit))
-      folder_.log("limits", {{"step", sim_->step()}, {"dt", sim_->time_step()}, {"dt_crit", limits.dt_crit}, {"dt_limit", limits.dt_limit}});
+      folder_.log("limits", {{"step", sim_->step()}, {"dt", sim_->time_step()}, {"dt_crit", limits.dt_crit}, {"dt_pairs", limits.dt_pairs}, {"dt_limit", limits.dt_limit}});
     if (c_.time.step) {
       const double ratio = sim_->time_step() / limits.dt_limit;
       if (ratio > 1.0 && !c_.time.allow_unstable)
@@ -164,9 +165,9 @@ class Experiment {
     StepLimits ruling = limits;
     const StepLimits free = first_step(c_).limits;
     // A loose bed says nothing of the dense one that it is about to become.
-    if (m.coordination_number < 3.0) ruling.dt_crit = std::min(ruling.dt_crit, free.dt_crit), ruling.dt_limit = std::min(ruling.dt_limit, free.dt_limit);
+    if (m.coordination_number < 3.0) ruling.dt_pairs = std::min(ruling.dt_pairs, free.dt_pairs), ruling.dt_limit = std::min(ruling.dt_limit, free.dt_limit);
     const StageKind kind = current_.kind;
-    const double wanted = floor_to_grid(std::min(safety_of(c_, kind) * ruling.dt_crit, 0.8 * ruling.dt_limit));
+    const double wanted = floor_to_grid(std::min(safety_of(c_, kind) * ruling.dt_pairs, 0.8 * ruling.dt_limit));
     // Shorter at once, longer only where two looks in a row allow it, and never while spheres fall or are shaken: a bed in the
     // air allows a step that its next impact does not.
     const double now = sim_->time_step(), allowed = std::min(wanted, last_wanted_.value_or(wanted));
@@ -295,58 +296,14 @@ class Experiment {
     return fmt::format("duration {} over", pretty(duration, "s"));
   }
 
-  // Things that must not go unnoticed although every number is still finite.
   void guard(const Measures& m) {
-    if (m.fastest_spin * sim_->time_step() > 0.5)
-      throw RunError(fmt::format("a sphere turns by {:.3g} rad in one step at step {} (t = {:.6g} s): more than springs and rolling can follow{}; use a smaller time step",
-                                 m.fastest_spin * sim_->time_step(), m.step, m.time, fastest_turning_sphere()));
-    if (!(m.farthest <= farthest_allowed_))
-      throw RunError(fmt::format("a sphere is lost at step {} (t = {:.6g} s){}: {}; plates, walls or periodic sides keep spheres in, a smaller time step or lower speeds keep them slow",
-                                 m.step, m.time, farthest_sphere(),
-                                 std::isnan(m.farthest) ? std::string("a position or velocity is not a number") : fmt::format("farther out than 1000 times the box, {:.4g} m", farthest_allowed_)));
+    refuse_fast_spins(*sim_, m);
+    refuse_lost_spheres(*sim_, m, farthest_allowed_);
     const bool quasi_static = current_.kind == StageKind::compress || current_.kind == StageKind::crush;
     if (quasi_static && m.stress_top > 1e3) {
       const double I = row_of(m, c_.stages[closed_.size()].speed).inertial_number;
       if (I > 1e-3) warn("inertial number above 1e-3 at more than 1 kPa: not quasi-static");
     }
-  }
-
-  // Of the box, or of the space that the spheres take at the start where that is larger [m].
-  double size_of_space() const {
-    const Particles& p = sim_->state();
-    double size = std::max({c_.box.width, c_.box.depth, c_.box.height, 2.0 * sim_->largest_radius()});
-    for (std::size_t k = 0; k < static_cast<std::size_t>(p.count); ++k) size = std::max({size, std::fabs(p.x[k]), std::fabs(p.y[k]), std::fabs(p.z[k])});
-    return size;
-  }
-
-  // The sphere that is not anywhere or farthest out, for messages.
-  std::string farthest_sphere() const {
-    const Particles& p = sim_->state();
-    const std::int32_t* found = nullptr;
-    double most = -1.0;
-    for (const std::int32_t& place : p.place) {
-      const auto k = static_cast<std::size_t>(place);
-      const double sum = std::fabs(p.x[k]) + std::fabs(p.y[k]) + std::fabs(p.z[k]);
-      const double all = sum + p.vx[k] + p.vy[k] + p.vz[k] + p.ux[k] + p.uy[k] + p.uz[k];
-      const double far = std::isfinite(all) ? sum : std::numeric_limits<double>::infinity();
-      if (far > most) most = far, found = &place;
-    }
-    if (!found) return "";
-    const auto k = static_cast<std::size_t>(*found);
-    return fmt::format("; sphere {} at ({:g}, {:g}, {:g}) m moves at ({:g}, {:g}, {:g}) m/s", p.id_of_rank[static_cast<std::size_t>(found - p.place.data())],
-                       p.x[k], p.y[k], p.z[k], p.vx[k], p.vy[k], p.vz[k]);
-  }
-
-  std::string fastest_turning_sphere() const {
-    const Particles& p = sim_->state();
-    std::string text;
-    double most = -1.0;
-    for (std::size_t rank = 0; rank < p.place.size(); ++rank) {
-      const auto k = static_cast<std::size_t>(p.place[rank]);
-      const double spin = std::sqrt(p.ux[k] * p.ux[k] + p.uy[k] * p.uy[k] + p.uz[k] * p.uz[k]) / p.radius_of(p.place[rank]);
-      if (spin > most) most = spin, text = fmt::format("; sphere {} at ({:g}, {:g}, {:g}) m turns at {:g} rad/s", p.id_of_rank[rank], p.x[k], p.y[k], p.z[k], spin);
-    }
-    return text;
   }
 
   void show_progress(std::size_t index, const Stand& stand, const std::optional<std::int64_t>& exact, double stage_begin) {

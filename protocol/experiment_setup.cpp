@@ -75,7 +75,7 @@ FirstStep first_step(const Case& c) {
     return first;
   }
   const double safety = c.stages.empty() ? c.time.safety : safety_of(c, c.stages.front().kind);
-  const double by_springs = safety * first.limits.dt_crit, by_dashpots = 0.8 * first.limits.dt_limit;
+  const double by_springs = safety * first.limits.dt_pairs, by_dashpots = 0.8 * first.limits.dt_limit;
   first.dt = floor_to_grid(std::min(by_springs, by_dashpots));
   first.rule = by_springs <= by_dashpots ? fmt::format("{:.3g} dt_crit", safety) : "0.8 dt_limit (dashpots)";
   return first;

@@ -42,8 +42,8 @@ struct StageResult {
   std::optional<double> initial_stiffness;   // [Pa]
   std::optional<bool> peak_found;
   StepRange time_step;
-  double residual_share = 0.0;               // change of the ledger's residual over what the stage dissipated (at least
-                                             // 1 % of all so far); NaN without a ledger
+  double residual_share = std::numeric_limits<double>::quiet_NaN();  // change of the ledger's residual over what the stage dissipated
+                                             // (at least 1 % of all so far); NaN without a ledger or an end
   std::vector<std::string> warnings;
   SeriesRow last;                            // the stage's last row
 };

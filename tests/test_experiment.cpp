@@ -244,7 +244,7 @@ TEST(TimeStep, AutoStaysBelowItsLimitsAndChangesOnTheGrid) {
       // Eigenvalues are good to 1 %; a load that grows by less than 1.3 is not looked at: (1.3)^(1/6) in the step.
       EXPECT_LE(used, 0.8 * limits.dt_limit * 1.01 * 1.045) << stage << " safety " << safety;
       if (std::string(safety) == "0.2") {
-        EXPECT_LE(used, 0.2 * limits.dt_crit * 1.01 * 1.045) << stage;
+        EXPECT_LE(used, 0.2 * limits.dt_pairs * 1.01 * 1.045) << stage;
       }
     }
   }

@@ -162,6 +162,28 @@ TEST(StepLimits, AgreeWithDenseMatrices) {
       }
 }
 
+// Without the planes' contacts, whatever their stiffness; the other answers do not change.
+TEST(StepLimits, OfPairsAlone) {
+  for (int seed = 1; seed <= 6; ++seed) {
+    const auto radii = radii_of(20 + 5 * seed, seed % 2 == 0, static_cast<std::uint64_t>(seed));
+    Network network = packed_bed(radii, {.e = 0.4}, 15e-3, 0.6, true, static_cast<std::uint64_t>(seed), 1.06);
+    Network pairs = network;
+    std::erase_if(pairs.contacts, [](const StiffContact& c) { return c.j < 0; });
+    ASSERT_LT(pairs.contacts.size(), network.contacts.size());
+    for (StiffContact& c : network.contacts)
+      if (c.j < 0) c.k_n *= 10.0;
+    const StepLimits limits = step_limits(network.bodies, network.contacts, {}, {.pairs_alone = true}),
+                     plain = step_limits(network.bodies, network.contacts);
+    const double exact = 2.0 / std::sqrt(Dense(pairs).largest(1.0, 0.0));
+    EXPECT_NEAR(limits.dt_pairs, exact, 0.005 * exact);
+    EXPECT_LT(limits.dt_crit, 0.8 * limits.dt_pairs);
+    EXPECT_EQ(limits.dt_crit, plain.dt_crit);
+    EXPECT_EQ(limits.dt_limit, plain.dt_limit);
+    EXPECT_EQ(plain.dt_pairs, plain.dt_crit);
+    EXPECT_EQ(step_limits(pairs.bodies, pairs.contacts, {}, {.pairs_alone = true}).dt_pairs, step_limits(pairs.bodies, pairs.contacts).dt_crit);
+  }
+}
+
 TEST(StepLimits, ClosePackedCluster) {
   // 34312 /s was found independently, with k_t = 1429 N/m; 0.01 % is the rounding of that number and of k_t.
   Network network = close_packed({});

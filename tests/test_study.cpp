@@ -11,10 +11,10 @@
 
 #include "protocol/output/hdf5_file.h"
 #include "protocol/study/collapse.h"
-#include "protocol/study/plan.h"
 #include "protocol/study/runner.h"
-#include "protocol/study/study_file.h"
+#include "tests/case_texts.h"
 #include "tests/program.h"
+#include "tests/study_folder.h"
 
 namespace platen::test {
 namespace {
@@ -89,43 +89,11 @@ power = "stiffness"
 observables = "porosity"
 )";
 
-struct StudyFolder {
-  TemporaryFolder folder;
-  explicit StudyFolder(const std::string& study = study_text, const std::string& base = base_text) {
-    write_file(folder / "tiny.toml", base);
-    write_file(folder / "study.toml", study);
-  }
-  fs::path file() const { return folder / "study.toml"; }
-  std::vector<std::string> words(const std::string& results, const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> out{"study", file().string(), "-o", (folder / results).string(), "--jobs", "2"};
-    out.insert(out.end(), more.begin(), more.end());
-    return out;
-  }
-};
-
-std::string replaced(std::string text, const std::string& what, const std::string& by) {
-  const std::size_t at = text.find(what);
-  if (at == std::string::npos) throw std::logic_error("no " + what);
-  return text.replace(at, what.size(), by);
-}
-
-// What is wrong with a study, as its user reads it.
-std::string complaint(const std::string& text, const std::string& base = base_text) {
-  const StudyFolder study(text, base);
-  try {
-    const Study s = read_study(study.file());
-    make_plan(s);
-  } catch (const CaseError& error) {
-    return error.what();
-  }
-  return "nothing";
-}
-
 // -------------------------------------------------------------------------------------------------------- study files
 
 TEST(StudyFile, MisspeltKeysNameTheNearest) {
   const std::string text =
-      complaint(replaced(replaced(study_text, "stiffness =", "stifness ="), "title = \"tiny\"", "tilte = \"tiny\""));
+      complaint(replaced("title = \"tiny\"", "tilte = \"tiny\"", replaced("stiffness =", "stifness =", study_text)), base_text);
   EXPECT_NE(text.find("study.toml:2:1: study.tilte: unknown key"), std::string::npos) << text;
   EXPECT_NE(text.find("nearest known key: title"), std::string::npos) << text;
   EXPECT_NE(text.find("study.toml:12:1: curve.stifness: unknown key"), std::string::npos) << text;
@@ -152,25 +120,25 @@ TEST(StudyFile, WrongValues) {
       {"power = \"stiffness\"", "power = \"density\"", "\"density\" is unknown"},
   };
   for (const auto& c : cases) {
-    const std::string text = complaint(replaced(study_text, c.what, c.by));
+    const std::string text = complaint(replaced(c.what, c.by, study_text), base_text);
     EXPECT_NE(text.find(c.expected), std::string::npos) << c.by << "\n" << text;
   }
 }
 
 TEST(StudyFile, ImpossibleCasesAreFoundBeforeAnyRun) {
   const std::string weak =
-      complaint(replaced(study_text, "stiffness = [0, 1, 2]", "vary = { \"particles.law.k2\" = [25000.0, 4000.0] }"));
+      complaint(replaced("stiffness = [0, 1, 2]", "vary = { \"particles.law.k2\" = [25000.0, 4000.0] }", study_text), base_text);
   EXPECT_NE(weak.find("study.toml:9:1: curve: \"coarse k2=4000.0\" is not a possible case:"), std::string::npos)
       << weak;
   EXPECT_NE(weak.find("allowed: k2 >= k1"), std::string::npos) << weak;
-  const std::string key = complaint(replaced(study_text, "stiffness = [0, 1, 2]", "set = \"particles.law.k3=1\""));
+  const std::string key = complaint(replaced("stiffness = [0, 1, 2]", "set = \"particles.law.k3=1\"", study_text), base_text);
   EXPECT_NE(key.find("particles.law.k3: unknown key"), std::string::npos) << key;
-  const std::string step = complaint(replaced(study_text, "stiffness = [0, 1, 2]", "set = \"time.step=1e-3\""));
+  const std::string step = complaint(replaced("stiffness = [0, 1, 2]", "set = \"time.step=1e-3\"", study_text), base_text);
   EXPECT_NE(step.find("\"coarse\" is not a possible case"), std::string::npos) << step;
   const std::string dashpots =
-      complaint(replaced(study_text, "radius = \"3 mm\"\nstiffness = [0, 1, 2]", "radius = 0.004\ndashpots = 9"));
+      complaint(replaced("radius = \"3 mm\"\nstiffness = [0, 1, 2]", "radius = 0.004\ndashpots = 9", study_text), base_text);
   EXPECT_NE(dashpots.find("critical damping"), std::string::npos) << dashpots;
-  const std::string base = complaint(study_text, replaced(base_text, "count = 60", "cuont = 60"));
+  const std::string base = complaint(study_text, replaced("count = 60", "cuont = 60", base_text));
   EXPECT_NE(base.find("nearest known key: count"), std::string::npos) << base;
 }
 
@@ -188,8 +156,8 @@ TEST(StudyFile, ShippedOnesAreRight) {
 
 TEST(StudyPlan, ProductOfRadiiPowersAndKeys) {
   const StudyFolder folder(replaced(
-      study_text, "radius = \"3 mm\"\nstiffness = [0, 1, 2]",
-      "radii = [\"2.5 mm\", \"3 mm\"]\nadhesion = [1, 2, 3]\nvary = { \"particles.law.friction\" = [0.3, 0.5] }"));
+      "radius = \"3 mm\"\nstiffness = [0, 1, 2]",
+      "radii = [\"2.5 mm\", \"3 mm\"]\nadhesion = [1, 2, 3]\nvary = { \"particles.law.friction\" = [0.3, 0.5] }", study_text), base_text);
   const Study study = read_study(folder.file(), {"study.seeds=[4, 5]"});
   const StudyPlan plan = make_plan(study);
   const PlannedPart& part = plan.parts.at(0);
@@ -285,7 +253,7 @@ std::string tables_of(const fs::path& folder) {
 }
 
 TEST(Study, EndToEndAndKilledAtRandomPoints) {
-  const StudyFolder study;
+  const StudyFolder study(study_text, base_text);
   const ProgramResult whole = run_program(study.words("whole"));
   ASSERT_EQ(whole.exit_code, 0) << whole.report();
   const fs::path folder = study.folder / "whole";
@@ -329,7 +297,7 @@ TEST(Study, EndToEndAndKilledAtRandomPoints) {
 
 TEST(Study, AFailingRunIsMarkedAndTheRestFinishes) {
   const StudyFolder study(
-      replaced(study_text, "stiffness = [0, 1, 2]", "vary = { \"stage.settle.max_duration\" = [60.0, 0.001] }"));
+      replaced("stiffness = [0, 1, 2]", "vary = { \"stage.settle.max_duration\" = [60.0, 0.001] }", study_text), base_text);
   const ProgramResult result = run_program(study.words("out"));
   EXPECT_EQ(result.exit_code, 6) << result.report();
   EXPECT_NE(result.err.find("1 of 3 runs failed"), std::string::npos) << result.report();
@@ -345,7 +313,7 @@ TEST(Study, AFailingRunIsMarkedAndTheRestFinishes) {
 }
 
 TEST(Study, StopsWhenToldAndGoesOn) {
-  const StudyFolder study;
+  const StudyFolder study(study_text, base_text);
   RunningProgram running(study.words("out"), {});
   for (int k = 0; k < 2000 && !fs::exists(study.folder / "out/logs"); ++k)
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -359,7 +327,7 @@ TEST(Study, StopsWhenToldAndGoesOn) {
 }
 
 TEST(Study, CommandLine) {
-  const StudyFolder study;
+  const StudyFolder study(study_text, base_text);
   EXPECT_EQ(run_program({"study", study.file().string()}).exit_code, 2);  // no -o
   EXPECT_EQ(
       run_program({"study", (study.folder / "none.toml").string(), "-o", (study.folder / "a").string()}).exit_code, 3);

@@ -53,14 +53,14 @@ inline StepLimits loose_limits(const Simulation& sim, double soft_overlap) {
   return free_limits(m, c.k2 * slope, c.ratio * K1, beta, beta * c.beta_ratio);
 }
 
-// The automatic step of the program: min(0.3 dt_crit, 0.8 dt_limit).
+// The automatic step of the program: min(0.3 dt_pairs, 0.8 dt_limit).
 inline void choose_step(Simulation& sim, double soft_overlap) {
   StepLimits loose = loose_limits(sim, soft_overlap);
   if (sim.time_step() > 0.0) {
     const StepLimits now = sim.step_limits();
-    loose.dt_crit = std::min(loose.dt_crit, now.dt_crit), loose.dt_limit = std::min(loose.dt_limit, now.dt_limit);
+    loose.dt_pairs = std::min(loose.dt_pairs, now.dt_pairs), loose.dt_limit = std::min(loose.dt_limit, now.dt_limit);
   }
-  sim.set_time_step(floor_to_grid(std::min(0.3 * loose.dt_crit, 0.8 * loose.dt_limit)));
+  sim.set_time_step(floor_to_grid(std::min(0.3 * loose.dt_pairs, 0.8 * loose.dt_limit)));
 }
 
 inline double mechanical(const Measures& m) {

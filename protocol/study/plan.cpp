@@ -161,6 +161,8 @@ class Planner {
         const Case unscaled = read_case(study.base, all);
         for (std::string& change : scaling_overrides(unscaled, curve.powers, lambda)) all.push_back(std::move(change));
         all.push_back("case.seed=" + std::to_string(seed));
+        // A default that another version changes makes it another run.
+        if (!unscaled.time.step) all.push_back(fmt::format("time.safety={}", unscaled.time.safety));
         if (!unscaled.particles.file.empty())  // the case moves to another folder
           all.push_back("particles.file=\"" +
                         std::filesystem::absolute(study.base.parent_path() / unscaled.particles.file).string() + "\"");
