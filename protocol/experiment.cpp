@@ -167,7 +167,7 @@ class Experiment {
     // A loose bed says nothing of the dense one that it is about to become.
     if (m.coordination_number < 3.0) ruling.dt_pairs = std::min(ruling.dt_pairs, free.dt_pairs), ruling.dt_limit = std::min(ruling.dt_limit, free.dt_limit);
     const StageKind kind = current_.kind;
-    const double wanted = floor_to_grid(std::min(safety_of(c_, kind) * ruling.dt_pairs, 0.8 * ruling.dt_limit));
+    const double wanted = floor_to_grid(std::min(c_.time.safety * ruling.dt_pairs, 0.8 * ruling.dt_limit));
     // Shorter at once, longer only where two looks in a row allow it, and never while spheres fall or are shaken: a bed in the
     // air allows a step that its next impact does not.
     const double now = sim_->time_step(), allowed = std::min(wanted, last_wanted_.value_or(wanted));
@@ -272,7 +272,8 @@ class Experiment {
     current_.last_step = sim_->step(), current_.time_end = sim_->time();
     current_.wall_seconds = now() - stage_begin;
     current_.strain_zero_height = strain_zero_height_;
-    const Snapshot snapshot = sim_->snapshot(c_.output.contacts);
+    const Snapshot snapshot = sim_->snapshot();
+    if (sim_->area() > 0.0 && snapshot.z_top > snapshot.z_bottom) current_.bed = bed_stress(snapshot, c_.box.width, c_.box.depth);
     const Profile heights = sim_->area() > 0.0 ? profile(snapshot, sim_->area(), c_.output.slabs) : Profile{};
     if (end != End::stopped) {
       const StepLimits limits = sim_->step_limits(current_.time_step.ruled_by);

@@ -66,10 +66,6 @@ struct FirstStep {
 };
 FirstStep first_step(const Case& c);
 
-// What a stage takes of time.safety: half while spheres fall or are shaken. Impacts on plates, far stiffer than a bed at rest and met between
-// two steps, rule the error there.
-double safety_of(const Case& c, StageKind kind);
-
 // Throws CaseError where a fixed time.step is above 0.9 dt_limit and time.allow_unstable is not set.
 void refuse_unstable_step(const Case& c);
 

@@ -49,10 +49,6 @@ SphereTable filled_spheres(const Case& c) {
 
 }  // namespace
 
-double safety_of(const Case& c, StageKind kind) {
-  return kind == StageKind::fill || kind == StageKind::vibrate ? 0.5 * c.time.safety : c.time.safety;
-}
-
 FirstStep first_step(const Case& c) {
   const PairLaw& law = c.particles.law;
   // The smallest sphere rules; stiffnesses that grow with the overlap are taken at a tenth of its radius.
@@ -74,7 +70,7 @@ FirstStep first_step(const Case& c) {
     first.rule = "fixed by time.step";
     return first;
   }
-  const double safety = c.stages.empty() ? c.time.safety : safety_of(c, c.stages.front().kind);
+  const double safety = c.time.safety;
   const double by_springs = safety * first.limits.dt_pairs, by_dashpots = 0.8 * first.limits.dt_limit;
   first.dt = floor_to_grid(std::min(by_springs, by_dashpots));
   first.rule = by_springs <= by_dashpots ? fmt::format("{:.3g} dt_crit", safety) : "0.8 dt_limit (dashpots)";

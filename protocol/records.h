@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/measures.h"
+#include "core/stress_tensor.h"
 #include "protocol/case_file.h"
 
 namespace platen {
@@ -44,6 +45,7 @@ struct StageResult {
   StepRange time_step;
   double residual_share = std::numeric_limits<double>::quiet_NaN();  // change of the ledger's residual over what the stage dissipated
                                              // (at least 1 % of all so far); NaN without a ledger or an end
+  std::optional<BedStress> bed;              // mean stress and fabric at the end; none where there is no volume
   std::vector<std::string> warnings;
   SeriesRow last;                            // the stage's last row
 };

@@ -72,6 +72,8 @@ def check_folder(folder):
                 assert key in stage.attrs, (name, key)
             check_group(stage["particles"], PARTICLES)
             assert (np.diff(stage["particles/id"][:]) > 0).all()
+            if "stress" in stage:
+                assert stage["stress"].shape == (3, 3) and stage["fabric"].shape == (3, 3)
             if "strain_zero_height" in stage.attrs:
                 zero = stage.attrs["strain_zero_height"]
                 mine = in_stage == name
@@ -100,6 +102,8 @@ def check_folder(folder):
             attributes = file["stages"][stage["name"]].attrs
             assert stage["end_reason"] == attributes["end_reason"] and stage["steps"] == attributes["steps"]
             assert set(stage["values"]) <= set(COLUMNS)
+            if "bed" in stage:
+                assert same(np.array(stage["bed"]["stress"]), file["stages"][stage["name"]]["stress"][:])
             row = np.flatnonzero(in_stage == stage["name"])[-1]
             for name, value in stage["values"].items():
                 if name != "stage":

@@ -58,8 +58,8 @@ TEST(CheckCommand, TimeStep) {
   const CheckReport r = check_report(good(), 1);
   // dt_crit of a dense bed: 0.75 sqrt(m/k2) at k2 = 5 k1.
   EXPECT_NEAR(r.limits.dt_crit / (0.75 * std::sqrt(mass(2.5e-3) / 25e3)), 1.0, 0.01);
-  EXPECT_LE(r.dt, 0.15 * r.limits.dt_crit);
-  EXPECT_GE(r.dt, 0.15 * r.limits.dt_crit / std::pow(2.0, 1.0 / 16.0));
+  EXPECT_LE(r.dt, 0.3 * r.limits.dt_crit);
+  EXPECT_GE(r.dt, 0.3 * r.limits.dt_crit / std::pow(2.0, 1.0 / 16.0));
   EXPECT_LT(r.limits.dt_limit, r.limits.dt_crit);
   EXPECT_NE(r.rule.find("dt_crit"), std::string::npos);
   EXPECT_EQ(check_report(good({"time.step=1e-5"}), 1).dt, 1e-5);

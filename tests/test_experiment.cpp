@@ -126,6 +126,26 @@ TEST(Exit, StopAfterEndsWell) {
   EXPECT_TRUE(json.contains("state_hash"));
 }
 
+// What a user reads: the stress of the contacts is that of the plates at rest, in both files, also without contacts written.
+TEST(Bed, StressAndFabricAreWritten) {
+  const std::string rest = "[[stage]]\nkind = \"settle\"\nuntil = { kinetic_to_potential = 1e-6, window = \"20 ms\" }\n";
+  const Trial run = run_case(small_bed + fill + quick_settle + press + rest, {"output.contacts=false", "stage.4.max_duration=\"5 s\""});
+  ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
+  const auto json = summary(run)["stages"].back();
+  const double V = 4e-4 * json["values"]["height"].get<double>();
+  const double plates = json["values"]["stress_top"].get<double>() + json["values"]["potential_energy"].get<double>() / V;
+  ASSERT_GT(plates, 1e3);
+  EXPECT_NEAR(json["bed"]["stress"][2][2].get<double>(), plates, 0.01 * plates);
+  const double ratio = json["bed"]["lateral_stress_ratio"];
+  EXPECT_GT(ratio, 0.2);
+  EXPECT_LT(ratio, 1.0);
+  const auto stress = ResultsFile(run.path() / "results.h5").doubles("/stages/" + json["name"].get<std::string>() + "/stress").values;
+  const auto fabric = ResultsFile(run.path() / "results.h5").doubles("/stages/" + json["name"].get<std::string>() + "/fabric").values;
+  ASSERT_EQ(stress.size(), 9u);
+  for (std::size_t k = 0; k < 9; ++k) EXPECT_EQ(stress[k], json["bed"]["stress"][k / 3][k % 3].get<double>()) << k;
+  EXPECT_NEAR(fabric[0] + fabric[4] + fabric[8], 1.0, 1e-12);
+}
+
 TEST(Exit, ASignalStopsSoon) {
   std::atomic<int> signal = 0;
   RunOptions options;

@@ -394,13 +394,14 @@ TEST(PorosityMatchStudy, MeetsTheToleranceAlsoWhenInterrupted) {
 }
 
 TEST(PorosityMatchStudy, VibrationAndAnAutomaticStep) {
-  const std::string finer = replaced("0.003", "0.001", replaced("\"growth\"", "\"vibration\"", replaced("3 mm", "2.2 mm", replaced("[1, 2]", "[1]", study_text))));
+  // Shaken for so short a time that it must be searched.
+  const std::string finer = replaced("\"growth\"", "\"vibration\"", replaced("3 mm\"", "2.2 mm\"\nset = \"stage.vibrate.duration=0.02\"", replaced("[1, 2]", "[1]", study_text)));
   const StudyFolder study(finer, replaced("\"15 us\"", "\"auto\"", base_text));
   const ProgramResult result = run_program(study.words("out"));
   ASSERT_EQ(result.exit_code, 0) << result.report();
   const CsvTable table = read_csv(study.folder / "out/tables/porosity_match.csv");
   ASSERT_EQ(table.rows.size(), 1u);
-  EXPECT_NEAR(table.number(0, "porosity"), table.number(0, "wanted porosity"), 0.001);
+  EXPECT_NEAR(table.number(0, "porosity"), table.number(0, "wanted porosity"), 0.003);
   EXPECT_GT(numbers(table.cell(0, "tried values")).size(), 1u) << "nothing had to be searched: the test shows nothing";
   const Case c = read_case(study.folder / "out/runs" / table.cell(0, "run") / "case.toml");
   EXPECT_EQ(*stage_of(c, "vibrate").duration, table.number(0, "value"));

@@ -2,6 +2,8 @@
 // time step, rest of a cohesive bed.
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
+
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -109,6 +111,49 @@ TEST(VerificationBed, StressFromContactsAtRest) {
     EXPECT_GE(b.principal[0], b.principal[2]);
     if (row.gravity > 0.0) balance.check(row.name, m.support_force / m.weight, 1.0, 0.01);
   }
+}
+
+// Turned at the start and turned back at the end: the same, whatever the law. 27 spheres that collide and stick, in open space.
+TEST(VerificationBed, RotatedFrame) {
+  heading("A turned frame: 27 spheres that collide in open space, 600 steps");
+  Figure position("difference of positions / R", ""), velocity("difference of velocities / largest speed", ""), spin("difference of spins / largest spin", "");
+  using Vector = Eigen::Vector3d;
+  for (const scenes::LawCase& law : scenes::laws_of_scenes())
+    for (const auto& [axis, angle] : {std::pair(Vector(1, 2, 3), 0.7), std::pair(Vector(-2, 1, 0.3), 2.9), std::pair(Vector(0.1, -1, 5), 4.4)}) {
+      scenes::BedOptions o;
+      o.nx = o.ny = o.nz = 3, o.spacing = law.spread > 0.0 ? 1.6 : 1.99, o.spread = law.spread, o.speed = 0.3, o.periodic = false;
+      SimulationSetup setup = scenes::bed(o, law.law, best());
+      setup.gravity = 0.0;
+      SimulationSetup turned = setup;
+      const Eigen::Matrix3d turn = Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix();
+      for (std::vector<double>* rows : {&turned.spheres.position, &turned.spheres.velocity, &turned.spheres.spin})
+        for (std::size_t k = 0; k < rows->size(); k += 3) Eigen::Map<Vector>(rows->data() + k) = turn * Eigen::Map<Vector>(rows->data() + k).eval();
+      std::size_t contacts = 0;
+      const auto end_of = [&](SimulationSetup start) {
+        Simulation sim(std::move(start));
+        sim.set_time_step(2e-6);
+        sim.advance(100);
+        contacts = sim.snapshot().contacts.size();
+        sim.advance(500);
+        return sim.snapshot();
+      };
+      const Snapshot a = end_of(std::move(setup)), b = end_of(std::move(turned));
+      ASSERT_GT(contacts, 10u) << law.name;
+      const auto largest = [](const std::vector<double>& rows) {
+        double most = 0.0;
+        for (std::size_t k = 0; k < rows.size(); k += 3) most = std::max(most, Eigen::Map<const Vector>(rows.data() + k).norm());
+        return most;
+      };
+      const auto apart = [&](const std::vector<double>& straight, const std::vector<double>& other) {
+        double most = 0.0;
+        for (std::size_t k = 0; k < straight.size(); k += 3)
+          most = std::max(most, (turn * Eigen::Map<const Vector>(straight.data() + k) - Eigen::Map<const Vector>(other.data() + k)).norm());
+        return most;
+      };
+      position.check_below(law.name, apart(a.particles.position, b.particles.position) / o.R, 1e-11);
+      velocity.check_below(law.name, apart(a.particles.velocity, b.particles.velocity) / largest(a.particles.velocity), 1e-9);
+      spin.check_below(law.name, apart(a.particles.angular_velocity, b.particles.angular_velocity) / largest(a.particles.angular_velocity), 1e-9);
+    }
 }
 
 // A tensor that is known: two spheres in line along (1, 2, 2)/3, and a sphere pressed on a plate.

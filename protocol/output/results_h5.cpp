@@ -118,6 +118,16 @@ void describe_stage(Hdf5Group& group, const StageResult& s, std::size_t number, 
   if (!warnings.empty()) group.attribute("warnings", warnings);
 }
 
+void write_bed(Hdf5Group& stage, const BedStress& bed) {
+  const auto rows = [](const Tensor& t) {
+    std::vector<double> out;
+    for (const auto& row : t) out.insert(out.end(), row.begin(), row.end());
+    return out;
+  };
+  stage.write("stress", rows(bed.stress), 3, {"Pa", "mean stress of the bed from its contacts, compression positive"});
+  stage.write("fabric", rows(bed.fabric), 3, {"-", "mean of n n over touching pairs"});
+}
+
 void write_provenance(Hdf5Group group, const RunInfo& info, const std::string& start_time) {
   char host[256] = "";
   if (::gethostname(host, sizeof host - 1) != 0) host[0] = '\0';
@@ -164,6 +174,7 @@ void write_results(const std::filesystem::path& path, const ResultsContent& cont
     Hdf5Group stage = stages.create_group(last_name);
     describe_stage(stage, last, content.closed.size(), content.snapshot);
     write_particles(stage.create_group("particles"), content.snapshot.particles);
+    if (last.bed) write_bed(stage, *last.bed);
     write_profile(profiles.create_group(last_name), content.profile);
 
     // The final state under its short name is the last stage's, not a copy.

@@ -54,6 +54,14 @@ Json stage_json(const StageResult& s) {
   set(step, "smallest_dt_crit", s.time_step.dt_crit), set(step, "smallest_dt_limit", s.time_step.dt_limit);
   if (!s.time_step.ruled_by.empty()) step["ruled_by"] = s.time_step.ruled_by;
   if (!step.empty()) stage["time_step"] = step;
+  if (s.bed) {
+    const BedStress& b = *s.bed;
+    stage["bed"] = {{"stress", b.stress}, {"pressure", b.pressure}, {"deviator", b.deviator},
+                    {"principal", b.principal}, {"principal_direction", b.principal_direction}};
+    const double upright = b.stress[2][2];
+    if (upright > 0.0) set(stage["bed"], "lateral_stress_ratio", 0.5 * (b.stress[0][0] + b.stress[1][1]) / upright);
+    if (b.pairs > 0) stage["bed"]["fabric"] = b.fabric, stage["bed"]["fabric_deviator"] = b.fabric_deviator;
+  }
   stage["warnings"] = s.warnings;
   return stage;
 }

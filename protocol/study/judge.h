@@ -62,6 +62,7 @@ void judge_quasi_static(Judge& judge);
 void judge_similarity_2(Judge& judge);
 void judge_similarity_3(Judge& judge);
 void judge_friction_limit(Judge& judge);
+void judge_like_reference(Judge& judge);
 void judge_cross_checks(Judge& judge);
 void judge_scans(Judge& judge);
 

@@ -11,7 +11,7 @@ namespace platen {
 const std::vector<std::string>& statement_groups() {
   static const std::vector<std::string> groups{"figures-4-7",  "figures-8-10", "figure-11",    "figures-12-14",
                                                "quasi-static", "similarity-2", "similarity-3", "friction-limit",
-                                               "cross-checks"};
+                                               "like-reference", "cross-checks"};
   return groups;
 }
 
@@ -28,6 +28,7 @@ std::vector<Statement> judge(const StudyPlan& plan, const std::vector<PartResult
       if (group == "similarity-2") judge_similarity_2(judge);
       if (group == "similarity-3") judge_similarity_3(judge);
       if (group == "friction-limit") judge_friction_limit(judge);
+      if (group == "like-reference") judge_like_reference(judge);
       if (group == "cross-checks") judge_cross_checks(judge);
     }
     judge_scans(judge);

@@ -19,7 +19,7 @@ struct Statement {
 };
 
 // Names that a study may ask for: figures-4-7, figures-8-10, figure-11, figures-12-14, quasi-static, similarity-2,
-// similarity-3, cross-checks.
+// similarity-3, friction-limit, like-reference, cross-checks.
 const std::vector<std::string>& statement_groups();
 
 // All groups that the parts ask for, and for every scan whether the power that the paper names is the best.

@@ -178,6 +178,39 @@ void judge_friction_limit(Judge& judge) {
   }
 }
 
+// Does a curve answer as the one that it is compared with, by the bands of Fig. 8 and 10? And where sizes alone differ: how coarse may
+// spheres be?
+void judge_like_reference(Judge& judge) {
+  struct Quantity {
+    const char *scalar, *name;
+    double band;
+  };
+  for (const Quantity& q : {Quantity{"strain_peak", "strain at the end of loading", 0.12}, Quantity{"strength", "unconfined strength", 0.15}}) {
+    std::map<double, bool> holds;  // radius -> of curves that differ in nothing else
+    const double wanted = 2.0 - judge.part().plan->base.particles.law.exponent;  // docs/scaling.md
+    for (const MeasuredCurve& curve : judge.part().curves) {
+      const MeasuredCurve& reference = judge.part().curves[curve.planned->reference];
+      if (&reference == &curve || curve.runs.empty() || reference.runs.empty()) continue;
+      const double ratio = Judge::mean(&curve, q.scalar) / Judge::mean(&reference, q.scalar);
+      if (!std::isfinite(ratio)) continue;
+      judge.number("like the reference", fmt::format("{}: {} over that of {}", curve.planned->label, q.name, reference.planned->label), ratio,
+                   {1.0 - q.band, 1.0 + q.band}, 3);
+      const auto& powers = curve.planned->powers;
+      if (judge.is_plain(curve) && powers.stiffness == wanted && powers.adhesion == 2.0) holds[curve.planned->radius] = std::abs(ratio - 1.0) <= q.band;
+    }
+    if (holds.size() < 2) continue;
+    double coarsest = 0.0;
+    for (const auto& [R, held] : holds) {
+      if (!held) break;
+      coarsest = R;
+    }
+    const BoxSpec& box = judge.part().plan->base.box;
+    judge.say("like the reference", fmt::format("coarsest size up to which the {} stays within {:g} %", q.name, 100.0 * q.band),
+              coarsest > 0.0 ? fmt::format("{}, box over diameter {:.3g}", size_text(coarsest), std::min(box.width, box.depth) / (2.0 * coarsest)) : "none",
+              coarsest > 0.0);
+  }
+}
+
 void judge_cross_checks(Judge& judge) {
   for (const MeasuredCurve& curve : judge.part().curves) {
     if (curve.runs.empty()) continue;
