@@ -119,6 +119,36 @@ SphereFacts sphere_facts(const Case& c) {
   return f;
 }
 
+namespace {
+
+std::optional<double> bond_number(const Case& c, const SphereFacts& f) {
+  const double mean_mass = f.mass_total / static_cast<double>(f.count);
+  if (!(c.gravity > 0.0)) return std::nullopt;
+  return std::fabs(c.particles.law.f0) / (mean_mass * c.gravity);
+}
+
+// None without a box.
+std::optional<BedGuess> guess_bed(const Case& c, const SphereFacts& f) {
+  const double area = c.box.width * c.box.depth;
+  if (!(area > 0.0) || c.stages.empty()) return std::nullopt;
+  const StageSpec& start = c.stages.front();
+  BedGuess bed;
+  bed.porosity = start.kind == StageKind::fill && start.porosity ? *start.porosity
+                                                                 : free_porosity(bond_number(c, f).value_or(0.0), c.particles.law.k_adh > 0.0);
+  bed.height = f.solid_volume / (area * (1.0 - bed.porosity));
+  bed.rain_height = f.solid_volume / (area * rain_solid_fraction);
+  return bed;
+}
+
+}  // namespace
+
+double expected_particle_steps(const Case& c) {
+  const SphereFacts f = sphere_facts(c);
+  double sum = 0.0;
+  for (const ExpectedStage& s : expected_stages(c, guess_bed(c, f).value_or(BedGuess{}), f.count, first_step(c).dt, 1.0)) sum += s.wall;
+  return sum;
+}
+
 CheckReport check_report(const Case& c, int threads) {
   refuse_unstable_step(c);
   CheckReport report;
@@ -127,18 +157,9 @@ CheckReport check_report(const Case& c, int threads) {
   const FirstStep first = first_step(c);
   report.dt = first.dt, report.limits = first.limits, report.rule = first.rule;
 
-  const double mean_mass = f.mass_total / static_cast<double>(f.count);
-  if (c.gravity > 0.0) report.bond_number = std::fabs(c.particles.law.f0) / (mean_mass * c.gravity);
-  BedGuess bed;
-  const double area = c.box.width * c.box.depth;
-  if (area > 0.0 && !c.stages.empty()) {
-    const StageSpec& start = c.stages.front();
-    report.settled_porosity = start.kind == StageKind::fill && start.porosity ? *start.porosity
-                                                                              : free_porosity(report.bond_number.value_or(0.0), c.particles.law.k_adh > 0.0);
-    report.settled_height = bed.height = f.solid_volume / (area * (1.0 - *report.settled_porosity));
-    bed.porosity = *report.settled_porosity;
-    bed.rain_height = f.solid_volume / (area * rain_solid_fraction);
-  }
+  report.bond_number = bond_number(c, f);
+  const std::optional<BedGuess> bed = guess_bed(c, f);
+  if (bed) report.settled_porosity = bed->porosity, report.settled_height = bed->height;
   add_inertial_numbers(c, report);
   report.memory = bytes_of_program + bytes_of_sphere * static_cast<double>(f.count);
 
@@ -147,7 +168,7 @@ CheckReport check_report(const Case& c, int threads) {
   report.scene = speed.scene, report.instruction_set = speed.instruction_set, report.threads = speed.threads;
   report.why_scene = why_scene(c, f.equal), report.why_instruction_set = why_instruction_set();
   report.particle_steps_per_second = speed.particle_steps_per_second;
-  report.stages = expected_stages(c, bed, f.count, report.dt, speed.particle_steps_per_second);
+  report.stages = expected_stages(c, bed.value_or(BedGuess{}), f.count, report.dt, speed.particle_steps_per_second);
   add_notes(c, report);
   return report;
 }

@@ -48,6 +48,9 @@ struct CheckReport {
   std::vector<std::string> notes;
 };
 
+// Of all stages, a guess; rain counts less per step than a dense bed.
+double expected_particle_steps(const Case& c);
+
 // Measures the speed of this machine for about 0.3 s. Throws CaseError for a time step that a run would refuse.
 CheckReport check_report(const Case& c, int threads);
 std::string check_text(const Case& c, const CheckReport& report);

@@ -11,6 +11,7 @@
 #include "core/simulation.h"
 #include "protocol/case_document.h"
 #include "protocol/case_reader.h"
+#include "protocol/check_command.h"
 #include "protocol/experiment.h"
 #include "protocol/study/porosity_match.h"
 
@@ -221,10 +222,7 @@ class Planner {
     added.name = unique;
     added.c = c;
     if (matched_to) added.match = JobMatch{&*study.match_porosity, *matched_to, c};
-    const double dt = c.time.step ? *c.time.step : first_step(c).dt;
-    const double spheres = static_cast<double>(c.particles.table ? static_cast<std::int64_t>(c.particles.table->size())
-                                                                 : c.particles.count);
-    added.weight = spheres / dt;
+    added.weight = expected_particle_steps(c);
     added.timed = repeat > 0;
     added.threads = study.threads;
     plan_.jobs.push_back(std::move(added));

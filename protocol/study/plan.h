@@ -25,7 +25,7 @@ struct Job {
   std::string name;     // of its folder, unique in the study
   Case c;               // c.text is the case.toml that the run folder must hold
   std::optional<JobMatch> match;
-  double weight = 0.0;  // expected cost, arbitrary unit: spheres over time step
+  double weight = 0.0;  // expected cost in particle-steps
   bool timed = false;
   int threads = 1;
 };

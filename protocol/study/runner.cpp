@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -42,6 +43,22 @@ std::string last_line(const fs::path& log) {
   for (std::string line; std::getline(lines, line);)
     if (line.find_first_not_of(" \t\r") != std::string::npos) found = line;
   return found;
+}
+
+// Step of the last whole row of a series; none before there is one. The file may be growing.
+std::optional<double> last_step(const fs::path& series) {
+  std::ifstream in(series, std::ios::binary | std::ios::ate);
+  if (!in) return std::nullopt;
+  const std::streamoff size = in.tellg(), tail = std::min<std::streamoff>(size, 4096);
+  std::string text(static_cast<std::size_t>(tail), '\0');
+  in.seekg(size - tail);
+  if (!in.read(text.data(), tail)) return std::nullopt;
+  const std::size_t end = text.rfind('\n'), begin = end == std::string::npos || end == 0 ? std::string::npos : text.rfind('\n', end - 1);
+  if (begin == std::string::npos) return std::nullopt;
+  const std::size_t comma = text.find(',', begin);  // time, step, ...
+  char* after = nullptr;
+  const double step = comma < end ? std::strtod(text.c_str() + comma + 1, &after) : 0.0;
+  return after != nullptr && *after == ',' ? std::optional(step) : std::nullopt;
 }
 
 // A run that was killed a moment ago may still hold its folder: waits until nobody does, at most 10 s. After that the
@@ -124,6 +141,8 @@ class Runner {
     std::size_t attempt;  // number of the try; 0: the run itself
     Clock::time_point begin;
     std::optional<double> steal;
+    fs::path series;             // of its run folder
+    double spheres = 0.0, particle_steps = 0.0;  // so far
   };
 
   bool stopping() const { return options_.stop_signal != nullptr && *options_.stop_signal != 0; }
@@ -196,7 +215,8 @@ class Runner {
     outcomes_[k].state = JobState::running;
     const std::optional<double> steal = job.timed ? steal_seconds() : std::nullopt;
     children_.push_back(
-        {start(options_.program, words, options_.folder / "logs" / (name + ".txt")), k, attempt, Clock::now(), steal});
+        {start(options_.program, words, options_.folder / "logs" / (name + ".txt")), k, attempt, Clock::now(), steal, folder / "series.csv",
+         static_cast<double>(c.particles.table ? static_cast<std::int64_t>(c.particles.table->size()) : c.particles.count)});
     newest_ = title(k, attempt, " try ");
   }
 
@@ -273,6 +293,13 @@ class Runner {
     if (options_.ended) options_.ended(plan_.jobs[k], outcomes_[k]);
   }
 
+  void look_at_children() {
+    if (Clock::now() < next_look_) return;
+    next_look_ = Clock::now() + std::chrono::seconds(1);
+    for (Child& child : children_)
+      if (const auto step = last_step(child.series)) child.particle_steps = child.spheres * *step;
+  }
+
   void report() {
     if (!options_.progress) return;
     StudyProgress p;
@@ -282,16 +309,18 @@ class Runner {
     p.running = children_.size();
     p.wall_seconds = since(begin_);
     p.newest = newest_;
-    double under_way = 0.0;  // cost of the running jobs that is behind them, as the finished ones suggest
-    if (done_seconds_ > 0.0) {
-      const double rate = done_weight_ / done_seconds_;
-      for (const Child& child : children_)
-        if (child.attempt == 0) under_way += std::min(0.95 * plan_.jobs[child.job].weight, rate * since(child.begin));
-      const double left = std::max(0.0, all_weight_ - done_weight_ - under_way) / rate;
-      p.seconds_left =
-          left / std::max<double>(1.0, std::min<double>(options_.jobs, static_cast<double>(p.jobs - finished_)));
+    look_at_children();
+    double under_way = 0.0, seconds = done_seconds_;  // what the running jobs have behind them, and the time that all took
+    for (const Child& child : children_) {
+      if (child.attempt > 0) continue;
+      under_way += std::min(0.95 * plan_.jobs[child.job].weight, child.particle_steps);
+      seconds += since(child.begin);
     }
-    p.fraction = all_weight_ > 0.0 ? (done_weight_ + under_way) / all_weight_ : 1.0;
+    const double behind = done_weight_ + under_way;
+    if (behind > 0.005 * all_weight_ || done_weight_ > 0.0)
+      p.seconds_left = std::max(0.0, all_weight_ - behind) * seconds / behind /
+                       std::max<double>(1.0, std::min<double>(options_.jobs, static_cast<double>(p.jobs - finished_)));
+    p.fraction = all_weight_ > 0.0 ? behind / all_weight_ : 1.0;
     options_.progress(p);
   }
 
@@ -302,7 +331,7 @@ class Runner {
   std::vector<std::size_t> queue_;          // jobs of which nothing runs, to be gone on with in this order
   std::string newest_;
   std::vector<Child> children_;
-  Clock::time_point begin_ = Clock::now();
+  Clock::time_point begin_ = Clock::now(), next_look_ = begin_;
   double all_weight_ = 0.0, done_weight_ = 0.0, done_seconds_ = 0.0;
   std::size_t finished_ = 0, failed_ = 0;
 };
