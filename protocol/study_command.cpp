@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <set>
 #include <cerrno>
 #include <cstdio>
 
@@ -64,14 +65,14 @@ void refuse_foreign_folder(const fs::path& folder) {
       throw OutputError(folder.string() + ": is not empty and holds no study; choose another folder (-o)");
 }
 
-// One line, in place on a terminal, every ten seconds elsewhere.
+// One line, in place on a terminal; elsewhere once a minute.
 class StudyPrinter {
  public:
   explicit StudyPrinter(ProgressPrinter::Style style) : style_(style) {}
   void update(const StudyProgress& p) {
     if (style_ == ProgressPrinter::Style::quiet || p.wall_seconds < next_) return;
     const bool in_place = style_ == ProgressPrinter::Style::in_place;
-    next_ = p.wall_seconds + (in_place ? 0.2 : 10.0);
+    next_ = p.wall_seconds + (in_place ? 0.2 : 60.0);
     std::string line =
         fmt::format("{} of {} runs done, {} running, {:.0f} %", p.finished, p.jobs, p.running, 100.0 * p.fraction);
     if (p.failed > 0) line += fmt::format(", {} failed", p.failed);
@@ -116,7 +117,10 @@ int study_command(const StudyCommand& command) {
   StudyPrinter printer(progress_style(stderr, command.quiet));
   RunnerOptions options;
   options.folder = command.folder;
-  options.jobs = command.jobs.value_or(usable_cores());
+  int widest = 1;  // threads of a run that goes beside others
+  for (const Job& job : plan.jobs)
+    if (!job.timed) widest = std::max(widest, job.threads);
+  options.jobs = command.jobs.value_or(std::max(1, usable_cores() / widest));
   options.stop_signal = &catch_stop_signals(command.quiet);
   options.progress = [&](const StudyProgress& progress) { printer.update(progress); };
   options.ended = [&](const Job& job, const JobOutcome& outcome) {
@@ -141,7 +145,9 @@ int study_command(const StudyCommand& command) {
       spdlog::warn("stopped by request, {} of {} runs are left; the same command goes on", stopped, plan.jobs.size());
     return exit_stopped;
   }
-  const std::vector<PartResults> results = analyse(plan, command.folder);
+  std::set<std::string> damaged;
+  const std::vector<PartResults> results = analyse(plan, command.folder, damaged);
+  for (const std::string& one : damaged) spdlog::error("{}", one);
   const std::vector<Statement> statements = judge(plan, results);
   for (const PartResults& part : results) {
     write_part_tables(command.folder, plan, part);
@@ -156,11 +162,11 @@ int study_command(const StudyCommand& command) {
     if (!statements.empty())
       print(fmt::format("statements: {} hold, {} do not hold, {} not judged (statements.md)\n", count(true),
                         count(false), count(std::nullopt)));
-    print(fmt::format("results: {} (study.h5, statements.md, runs.csv, tables/, figures/, runs/)\n",
-                      command.folder.string()));
+    print(fmt::format("results: {} (study.h5, statements.md, runs.csv, runs/, {})\n", command.folder.string(),
+                      study.parts.empty() ? "tables/, figures/" : "tables/ and figures/ in a folder for each part"));
   }
-  const int code = exit_code_of(outcomes);
-  if (code != exit_done)
+  const int failed = exit_code_of(outcomes), code = failed == exit_done && !damaged.empty() ? exit_io : failed;
+  if (failed != exit_done)
     spdlog::error("{} of {} runs failed: {}",
                   std::count_if(outcomes.begin(), outcomes.end(),
                                 [](const JobOutcome& o) { return o.state == JobState::failed; }),

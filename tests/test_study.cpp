@@ -89,6 +89,8 @@ power = "stiffness"
 observables = "porosity"
 )";
 
+const std::string without_scan = replaced("[[scan]]\npower = \"stiffness\"\nobservables = \"porosity\"\n", "", study_text);
+
 // -------------------------------------------------------------------------------------------------------- study files
 
 TEST(StudyFile, MisspeltKeysNameTheNearest) {
@@ -118,6 +120,8 @@ TEST(StudyFile, WrongValues) {
       {"[\"stress_strain\", \"stress_strain_unloading\"]", "[\"stress_strain\", \"unconfined\"]",
        "have different axes"},
       {"power = \"stiffness\"", "power = \"density\"", "\"density\" is unknown"},
+      {"power = \"stiffness\"", "power = \"adhesion\"", "has 1 values of the adhesion power at one size; allowed: at least three"},
+      {"stiffness = [0, 1, 2]", "stiffness = [0, 1, 1.0000001]", "there are two curves \"coarse a=1\""},
   };
   for (const auto& c : cases) {
     const std::string text = complaint(replaced(c.what, c.by, study_text), base_text);
@@ -157,7 +161,7 @@ TEST(StudyFile, ShippedOnesAreRight) {
 TEST(StudyPlan, ProductOfRadiiPowersAndKeys) {
   const StudyFolder folder(replaced(
       "radius = \"3 mm\"\nstiffness = [0, 1, 2]",
-      "radii = [\"2.5 mm\", \"3 mm\"]\nadhesion = [1, 2, 3]\nvary = { \"particles.law.friction\" = [0.3, 0.5] }", study_text), base_text);
+      "radii = [\"2.5 mm\", \"3 mm\"]\nadhesion = [1, 2, 3]\nvary = { \"particles.law.friction\" = [0.3, 0.5] }", without_scan), base_text);
   const Study study = read_study(folder.file(), {"study.seeds=[4, 5]"});
   const StudyPlan plan = make_plan(study);
   const PlannedPart& part = plan.parts.at(0);
@@ -215,28 +219,60 @@ TEST(Collapse, DistancesOfStraightLinesAreExact) {
   EXPECT_FALSE(collapse_error({line(1.0, 0.0)}, {Curve{}}));
 }
 
+// What is off by a power of R, by more or by less: E = |ratio^(p - best) - 1|. On the powers of the shipped scans.
 TEST(Collapse, ScanFindsTheMinimum) {
-  const std::vector<double> powers{0.0, 0.5, 1.0, 1.5, 2.0, 3.0};
-  const auto errors = [&](double best) {
+  const auto squares = [](const std::vector<double>& powers, double ratio, double best, double sign) {
     std::vector<double> out;
-    for (const double p : powers) out.push_back(0.3 * std::abs(p - best));
+    for (const double p : powers) out.push_back(std::pow(0.3 * (std::pow(ratio, sign * (p - best)) - 1.0), 2));
     return out;
   };
-  const auto one = least_error(powers, errors(1.2));
-  ASSERT_TRUE(one);
-  EXPECT_NEAR(one->power, 1.2, 1e-12);  // E^2 is a parabola: the fit is exact
-  EXPECT_NEAR(one->uncertainty, 0.0, 1e-7);
-  EXPECT_NEAR(one->error, 0.0, 1e-7);
-  EXPECT_TRUE(one->inside);
-  // Two seeds at 1.1 and 1.3: their mean, and the standard error 0.2/sqrt 2/sqrt 2.
-  const auto two = least_error(powers, std::vector{errors(1.1), errors(1.3)});
-  ASSERT_TRUE(two);
-  EXPECT_NEAR(two->power, 1.2, 1e-12);
-  EXPECT_NEAR(two->uncertainty, 0.1, 1e-12);
-  EXPECT_NEAR(two->error, 0.3 * 0.1, 1e-12);
-  EXPECT_FALSE(least_error(powers, errors(-1.0))->inside);
-  EXPECT_FALSE(least_error({1.0, 2.0}, std::vector{0.1, 0.2}));
-  EXPECT_FALSE(least_error({0.0, 1.0, 2.0}, std::vector{0.1, 0.3, 0.1}));  // opens downwards
+  for (const double sign : {1.0, -1.0})
+    for (const auto& [powers, best] : {std::pair(std::vector{1.0, 1.5, 1.75, 2.0, 2.25, 2.5, 3.0}, 2.0), std::pair(std::vector{0.0, 0.25, 0.5, 0.75, 1.0}, 0.5),
+                                       std::pair(std::vector{0.0, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0}, 1.13)}) {
+      const auto one = least_error(powers, squares(powers, 1.5, best, sign), 1.5);
+      ASSERT_TRUE(one);
+      EXPECT_NEAR(one->power, best, 1e-9);
+      EXPECT_NEAR(one->uncertainty, 0.0, 1e-7);
+      EXPECT_NEAR(one->error, 0.0, 1e-6);
+      EXPECT_TRUE(one->inside);
+    }
+  // Three points cannot tell the two forms apart, and say so.
+  const std::vector<double> three{1.0, 2.0, 3.0};
+  const auto coarse = least_error(three, squares(three, 1.5, 2.0, 1.0), 1.5);
+  ASSERT_TRUE(coarse);
+  EXPECT_GT(coarse->uncertainty, 0.01);
+  EXPECT_NEAR(std::abs(coarse->power - 2.0), coarse->uncertainty, 1e-9);
+  EXPECT_FALSE(least_error(three, squares(three, 1.5, 0.5, 1.0), 1.5).value_or(Minimum{}).inside);
+  EXPECT_FALSE(least_error({1.0, 2.0}, std::vector{0.1, 0.2}, 1.5));
+  EXPECT_FALSE(least_error({0.0, 1.0, 2.0}, std::vector{0.01, 0.09, 0.01}, 1.5));  // opens downwards
+}
+
+// The scatter of the reference shifts the minimum as that of the curves does; both must show.
+TEST(Collapse, ScanUncertaintyCountsBothScatters) {
+  const auto straight = [](double slope) { return Curve{{0.0, 1.0}, {0.0, slope}}; };
+  const double ratio = 1.5, off = 0.05;
+  for (const bool of_reference : {true, false}) {
+    ScanData data;
+    data.ratio = ratio;
+    data.powers = {1.0, 1.5, 2.0, 2.5, 3.0};
+    ScanObservable one;
+    one.name = "stress_strain";
+    one.x = grid({0.0, 1.0});
+    for (const double e : {-off, 0.0, off}) one.reference.push_back(straight(of_reference ? 1.0 + e : 1.0));
+    for (const double p : data.powers) {
+      std::vector<Curve>& curves = one.of_power.emplace_back();
+      for (const double e : {-off, 0.0, off}) curves.push_back(straight(std::pow(ratio, p - 2.0) * (of_reference ? 1.0 : 1.0 + e)));
+    }
+    data.observables.push_back(one);
+    const auto minimum = data.minimum({0});
+    ASSERT_TRUE(minimum);
+    EXPECT_EQ(minimum->degrees, 2);
+    EXPECT_NEAR(minimum->power, 2.0, 0.01);
+    // d power = d ln(slope) / ln(ratio); the standard error of a mean of three.
+    EXPECT_NEAR(minimum->uncertainty, off / std::sqrt(3.0) / std::log(ratio), 0.05 * 0.07) << of_reference;
+  }
+  EXPECT_NEAR(student_975(2), 4.303, 1e-3);
+  EXPECT_NEAR(student_975(60), 2.0, 0.05);
 }
 
 // -------------------------------------------------------------------------------------------------------- whole studies
@@ -295,9 +331,29 @@ TEST(Study, EndToEndAndKilledAtRandomPoints) {
   EXPECT_EQ(tables_of(study.folder / "killed"), expected);
 }
 
+// A finished run that was damaged later: the tables of the others are written, and the message says what helps.
+TEST(Study, ADamagedRunIsLeftOut) {
+  const StudyFolder study(study_text, base_text);
+  ASSERT_EQ(run_program(study.words("out")).exit_code, 0);
+  const CsvTable runs = read_csv(study.folder / "out/runs.csv");
+  const fs::path run = study.folder / "out/runs" / runs.cell(1, "run");
+  fs::resize_file(run / "results.h5", 1000);
+  fs::remove(study.folder / "out/statements.md");
+  const ProgramResult broken = run_program(study.words("out"));
+  EXPECT_EQ(broken.exit_code, 5) << broken.report();
+  EXPECT_NE(broken.err.find(run.filename().string()), std::string::npos) << broken.report();
+  EXPECT_NE(broken.err.find("remove this folder"), std::string::npos) << broken.report();
+  EXPECT_TRUE(fs::exists(study.folder / "out/statements.md"));
+  EXPECT_EQ(read_csv(study.folder / "out/tables/scans.csv").rows.size(), 0u);  // two powers are left
+  fs::remove_all(run);
+  const ProgramResult again = run_program(study.words("out"));
+  EXPECT_EQ(again.exit_code, 0) << again.report();
+  EXPECT_GT(read_csv(study.folder / "out/tables/scans.csv").rows.size(), 0u);
+}
+
 TEST(Study, AFailingRunIsMarkedAndTheRestFinishes) {
   const StudyFolder study(
-      replaced("stiffness = [0, 1, 2]", "vary = { \"stage.settle.max_duration\" = [60.0, 0.001] }", study_text), base_text);
+      replaced("stiffness = [0, 1, 2]", "vary = { \"stage.settle.max_duration\" = [60.0, 0.001] }", without_scan), base_text);
   const ProgramResult result = run_program(study.words("out"));
   EXPECT_EQ(result.exit_code, 6) << result.report();
   EXPECT_NE(result.err.find("1 of 3 runs failed"), std::string::npos) << result.report();

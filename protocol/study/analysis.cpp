@@ -1,9 +1,12 @@
 #include "protocol/study/analysis.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <string_view>
 #include <tuple>
 
@@ -22,16 +25,21 @@ nlohmann::json json_of(const fs::path& file) {
 }
 
 MeasuredCurve measure(const StudyPlan& plan, const PlannedPart& part, const PlannedCurve& planned,
-                      const fs::path& folder) {
+                      const fs::path& folder, std::set<std::string>& damaged) {
   MeasuredCurve out;
   out.planned = &planned;
   for (std::size_t k = 0; k < planned.jobs.size(); ++k) {
     const Job& job = plan.jobs[planned.jobs[k]];
     if (!is_done(folder, job)) continue;
     const fs::path run = run_folder(folder, job);
+    try {
+      out.runs.push_back(measure_run(run, job.c, part.study->strain_zero));
+    } catch (const std::exception& error) {  // damaged since: the others count all the same
+      damaged.insert(fmt::format("{}: {}; remove this folder, and the same command makes the run again", run.string(), error.what()));
+      continue;
+    }
     out.seeds.push_back(planned.seeds[k]);
     out.jobs.push_back(planned.jobs[k]);
-    out.runs.push_back(measure_run(run, job.c, part.study->strain_zero));
     const nlohmann::json performance = json_of(run / "summary.json").value("performance", nlohmann::json::object());
     out.wall_seconds.push_back(performance.value("wall_seconds", std::numeric_limits<double>::quiet_NaN()));
     out.steal_seconds.push_back(json_of(run / "timing.json").value("steal_seconds", 0.0));
@@ -78,19 +86,29 @@ class Scanner {
     std::vector<ScanResult> out;
     for (const auto& [group, curves] : groups) {
       if (curves.size() < 3) continue;
-      std::vector<ScanResult> parts;
-      for (const std::string& observable : part_.plan->study->observables) {
-        if (!chosen(spec_.observables, observable)) continue;
-        if (auto one = scan(curves, observable)) parts.push_back(std::move(*one));
-      }
-      if (parts.size() > 1) parts.push_back(together(parts));
-      for (ScanResult& one : parts) {
+      const ScanData data = data_of(curves, std::get<0>(group), std::get<3>(group));
+      std::vector<std::vector<std::size_t>> choices;
+      std::vector<std::size_t> all;
+      for (std::size_t o = 0; o < data.observables.size(); ++o) choices.push_back({o}), all.push_back(o);
+      if (all.size() > 1) choices.push_back(all);
+      for (const std::vector<std::size_t>& which : choices) {
+        ScanResult one;
         one.power = spec_.power;
         one.radius = std::get<0>(group);
         one.other_power = std::get<1>(group);
+        one.observable = which.size() > 1 ? "all" : data.observables[which.front()].name;
+        one.powers = data.powers;
+        one.seeds = static_cast<int>(data.observables[which.front()].of_power.front().size());
+        constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
+        one.errors.assign(one.powers.size(), 0.0);
+        for (const std::size_t o : which) {
+          const std::vector<double> squares = data.squares(o, none, none);
+          for (std::size_t p = 0; p < squares.size(); ++p) one.errors[p] += squares[p] / static_cast<double>(which.size());
+        }
+        for (double& e : one.errors) e = std::sqrt(e);
         const auto least = std::min_element(one.errors.begin(), one.errors.end());
         one.best_tried = one.powers[static_cast<std::size_t>(least - one.errors.begin())];
-        one.minimum = least_error(one.powers, one.each);
+        one.minimum = data.minimum(which);
         out.push_back(std::move(one));
       }
     }
@@ -102,43 +120,41 @@ class Scanner {
   double power(const PlannedCurve& c) const { return stiffness() ? c.powers.stiffness : c.powers.adhesion; }
   double other(const PlannedCurve& c) const { return stiffness() ? c.powers.adhesion : c.powers.stiffness; }
 
-  std::optional<ScanResult> scan(const std::map<double, std::size_t>& curves, const std::string& observable) const {
-    ScanResult out;
-    out.observable = observable;
+  // Observables that every power has, of the seeds that are there at every power.
+  ScanData data_of(const std::map<double, std::size_t>& curves, double radius, std::size_t reference) const {
+    ScanData data;
+    data.ratio = radius / part_.plan->reference_radius;
+    std::set<std::uint64_t> seeds;
     for (const auto& [power, k] : curves) {
-      const auto row = std::find_if(part_.collapse.begin(), part_.collapse.end(), [&, k = k](const CollapseRow& r) {
-        return r.curve == k && r.observable == observable;
-      });
-      if (row == part_.collapse.end() || !(row->error.error > 0.0)) return std::nullopt;
-      const double scale = row->error.relative / row->error.error;
-      out.powers.push_back(power);
-      out.errors.push_back(row->error.relative);
-      out.each.resize(std::max(out.each.size(), row->error.each.size()));
-      for (std::size_t s = 0; s < row->error.each.size(); ++s) out.each[s].push_back(scale * row->error.each[s]);
+      data.powers.push_back(power);
+      const std::set<std::uint64_t> own(part_.curves[k].seeds.begin(), part_.curves[k].seeds.end());
+      if (data.powers.size() == 1) seeds = own;
+      else std::erase_if(seeds, [&](std::uint64_t seed) { return !own.contains(seed); });
     }
-    // A seed that is missing at one power is missing in the scan.
-    std::erase_if(out.each, [&](const auto& one) { return one.size() != out.powers.size(); });
-    return out;
-  }
-
-  ScanResult together(const std::vector<ScanResult>& parts) const {
-    ScanResult out;
-    out.observable = "all";
-    out.powers = parts.front().powers;
-    const auto n = static_cast<double>(parts.size());
-    std::size_t seeds = parts.front().each.size();
-    for (const ScanResult& part : parts) seeds = std::min(seeds, part.each.size());
-    out.each.assign(seeds, std::vector<double>(out.powers.size(), 0.0));
-    out.errors.assign(out.powers.size(), 0.0);
-    for (std::size_t p = 0; p < out.powers.size(); ++p) {
-      for (const ScanResult& part : parts) {
-        out.errors[p] += part.errors[p] * part.errors[p] / n;
-        for (std::size_t s = 0; s < seeds; ++s) out.each[s][p] += part.each[s][p] * part.each[s][p] / n;
+    for (const std::string& name : part_.plan->study->observables) {
+      if (!chosen(spec_.observables, name)) continue;
+      ScanObservable one;
+      one.name = name;
+      one.reference = part_.curves[reference].curves(name);
+      one.scale = common_scale(part_.curves[reference], name);
+      std::vector<Curve> all = one.reference;
+      bool complete = !one.reference.empty() && !seeds.empty() && one.scale > 0.0;
+      for (const auto& [power, k] : curves) {
+        const MeasuredCurve& curve = part_.curves[k];
+        std::vector<Curve>& own = one.of_power.emplace_back();
+        for (std::size_t r = 0; r < curve.runs.size(); ++r) {
+          const auto found = curve.runs[r].curves.find(name);
+          if (seeds.contains(curve.seeds[r]) && found != curve.runs[r].curves.end()) own.push_back(found->second);
+        }
+        complete = complete && own.size() == seeds.size();
+        all.insert(all.end(), own.begin(), own.end());
       }
-      out.errors[p] = std::sqrt(out.errors[p]);
-      for (std::size_t s = 0; s < seeds; ++s) out.each[s][p] = std::sqrt(out.each[s][p]);
+      const auto range = complete ? common_range(all) : std::nullopt;
+      if (!range) continue;
+      one.x = grid(*range);
+      data.observables.push_back(std::move(one));
     }
-    return out;
+    return data;
   }
 
   const PartResults& part_;
@@ -161,12 +177,12 @@ std::vector<double> MeasuredCurve::values(const std::string& scalar) const {
   return out;
 }
 
-std::vector<PartResults> analyse(const StudyPlan& plan, const fs::path& folder) {
+std::vector<PartResults> analyse(const StudyPlan& plan, const fs::path& folder, std::set<std::string>& damaged) {
   std::vector<PartResults> all;
   for (const PlannedPart& part : plan.parts) {
     PartResults results;
     results.plan = &part;
-    for (const PlannedCurve& curve : part.curves) results.curves.push_back(measure(plan, part, curve, folder));
+    for (const PlannedCurve& curve : part.curves) results.curves.push_back(measure(plan, part, curve, folder, damaged));
     for (std::size_t k = 0; k < part.curves.size(); ++k) {
       const std::size_t reference = part.curves[k].reference;
       if (reference == k) continue;

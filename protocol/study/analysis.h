@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -39,8 +40,8 @@ struct ScanResult {
   double radius = 0.0;                    // [m]
   double other_power = 0.0;               // the one that is not scanned
   std::vector<double> powers;             // increasing
-  std::vector<double> errors;             // mean over seeds, relative to the reference's range
-  std::vector<std::vector<double>> each;  // [seed][power], relative
+  std::vector<double> errors;             // root mean square over seeds, relative to the reference's range
+  int seeds = 0;
   std::optional<Minimum> minimum;
   double best_tried = 0.0;  // the tried power of least error
 };
@@ -52,7 +53,7 @@ struct PartResults {
   std::vector<ScanResult> scans;
 };
 
-// Reads the folders of all jobs that are done. Throws OutputError.
-std::vector<PartResults> analyse(const StudyPlan& plan, const std::filesystem::path& folder);
+// Reads the folders of all jobs that are done. Runs that cannot be read are left out, with a message in `damaged`.
+std::vector<PartResults> analyse(const StudyPlan& plan, const std::filesystem::path& folder, std::set<std::string>& damaged);
 
 }  // namespace platen

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -48,21 +49,43 @@ struct Spread {
 };
 Spread spread_of(const std::vector<double>& values);
 
-// The minimum of a least-squares parabola through E^2 over the power, on the (at most) five powers around the smallest
-// E. E^2, because a distance grows linearly from its minimum and has a corner there, its square does not.
+// The minimum of a least-squares parabola through E^2 on the (at most) five powers around the smallest E. E^2, because a
+// distance grows linearly from its minimum and has a corner there, its square does not. The parabola is one in
+// u = ratio^p or ratio^-p, whichever fits better, ratio that of the radii: what scales as a power of R is off by |u/u0 - 1|.
 struct Minimum {
   double power = 0.0;
-  double uncertainty = 0.0;  // standard error; NaN where there is nothing to judge it by (three points, one seed)
+  double uncertainty = 0.0;  // standard error; NaN where there is nothing to judge it by
   double error = 0.0;        // E of the parabola there (0 where it dips below 0)
   bool inside = false;       // between the smallest and the largest power that were tried
+  int degrees = 0;           // of freedom of the uncertainty where seeds give it; 0: the fit alone
 };
 
-// One curve of E (one seed), the uncertainty from the residuals of the fit. Empty with fewer than three powers or where
-// the parabola has no minimum. `powers` increasing.
-std::optional<Minimum> least_error(const std::vector<double>& powers, const std::vector<double>& errors);
+// squares[power]: E^2. The uncertainty is that of the fit. Empty with fewer than three powers or where there is no minimum.
+// `powers` increasing.
+std::optional<Minimum> least_error(const std::vector<double>& powers, const std::vector<double>& squares, double ratio);
 
-// errors[seed][power]: the fit to the mean of E^2; with two seeds or more the uncertainty is the standard error of the
-// seeds' own minima.
-std::optional<Minimum> least_error(const std::vector<double>& powers, const std::vector<std::vector<double>>& errors);
+// Half width of the 95 % interval in standard errors (Student's t).
+double student_975(int degrees);
+
+// The curves of a scan, all on one axis per observable, so that every power is judged over the same range.
+struct ScanObservable {
+  std::string name;
+  std::vector<double> x;
+  double scale = 1.0;                       // range of the reference
+  std::vector<Curve> reference;             // one a seed
+  std::vector<std::vector<Curve>> of_power; // [power][seed], the same seeds at every power
+};
+struct ScanData {
+  double ratio = 1.0;  // radius over the reference's
+  std::vector<double> powers;
+  std::vector<ScanObservable> observables;
+
+  // Mean over seeds of the squared relative distance from the reference's mean, for each power; leaving one seed out, of the curves or of
+  // the reference (a number that no seed has: none).
+  std::vector<double> squares(std::size_t observable, std::size_t without_seed, std::size_t without_reference) const;
+  // Of the mean over these observables. Uncertainty with two seeds or more: that of the fit and, by delete-one jackknife, of the seeds
+  // of the curves and of the reference.
+  std::optional<Minimum> minimum(const std::vector<std::size_t>& which) const;
+};
 
 }  // namespace platen

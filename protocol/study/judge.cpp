@@ -24,6 +24,10 @@ std::vector<const MeasuredCurve*> Judge::plain() const {
   return out;
 }
 
+bool Judge::plain_are_there() const {
+  return std::none_of(part_.curves.begin(), part_.curves.end(), [&](const MeasuredCurve& curve) { return is_plain(curve) && curve.runs.empty(); });
+}
+
 const MeasuredCurve* Judge::reference() const {
   for (const MeasuredCurve* curve : plain())
     if (curve->planned->radius == part_.plan->reference_radius) return curve;
@@ -39,10 +43,16 @@ const MeasuredCurve* Judge::scaled(double radius, std::optional<double> a, std::
   return nullptr;
 }
 
+bool Judge::planned(double radius, double a, double b) const {
+  return std::any_of(part_.curves.begin(), part_.curves.end(), [&](const MeasuredCurve& curve) {
+    return is_plain(curve) && curve.planned->radius == radius && curve.planned->powers.stiffness == a && curve.planned->powers.adhesion == b;
+  });
+}
+
 std::vector<double> Judge::radii() const {
   std::set<double> out;
-  for (const MeasuredCurve* curve : plain())
-    if (curve->planned->radius != part_.plan->reference_radius) out.insert(curve->planned->radius);
+  for (const MeasuredCurve& curve : part_.curves)
+    if (is_plain(curve) && curve.planned->radius != part_.plan->reference_radius) out.insert(curve.planned->radius);
   return {out.begin(), out.end()};
 }
 
@@ -56,15 +66,34 @@ double Judge::deviation(const MeasuredCurve* curve, const std::string& scalar) {
   return curve == nullptr ? no_value : spread_of(curve->values(scalar)).deviation.value_or(no_value);
 }
 
+Estimate Judge::estimate(const MeasuredCurve* curve, const std::string& scalar) {
+  if (curve == nullptr) return {};
+  const Spread spread = spread_of(curve->values(scalar));
+  if (spread.count == 0) return {};
+  return {spread.mean, spread.deviation.value_or(no_value) / std::sqrt(static_cast<double>(spread.count))};
+}
+
+Estimate Judge::ratio(const MeasuredCurve* a, const MeasuredCurve* b, const std::string& scalar) {
+  const Estimate p = estimate(a, scalar), q = estimate(b, scalar);
+  const double value = p.value / q.value;
+  return {value, std::abs(value) * std::hypot(p.error / p.value, q.error / q.value)};
+}
+
+Estimate Judge::minus(const MeasuredCurve* a, const MeasuredCurve* b, const std::string& scalar) {
+  const Estimate p = estimate(a, scalar), q = estimate(b, scalar);
+  return {p.value - q.value, std::hypot(p.error, q.error)};
+}
+
 std::string Judge::shown(const MeasuredCurve* curve, const std::string& scalar, double scale, int decimals) {
   std::string text = fmt::format("{:.{}f}", scale * mean(curve, scalar), decimals);
   const double d = deviation(curve, scalar);
-  if (std::isfinite(d)) text += fmt::format(" +- {:.{}f}", scale * d, decimals);
+  if (std::isfinite(d)) text += fmt::format(" ± {:.{}f}", scale * d, decimals);
   return text;
 }
 
-void Judge::number(const std::string& figure, const std::string& text, double value, Bounds bounds, int decimals,
+void Judge::number(const std::string& figure, const std::string& text, Estimate found, Bounds bounds, int decimals,
                    const std::string& unit, double scale) {
+  const double value = found.value;
   if (!std::isfinite(value)) return missing(figure, text);
   const std::string with_unit = unit.empty() ? "" : " " + unit;
   std::string allowed;
@@ -74,13 +103,20 @@ void Judge::number(const std::string& figure, const std::string& text, double va
     allowed = fmt::format("at most {:g}{}", scale * bounds.high, with_unit);
   else
     allowed = fmt::format("at least {:g}{}", scale * bounds.low, with_unit);
-  say(figure, text + ": " + allowed, fmt::format("{:.{}f}{}", scale * value, decimals, with_unit),
+  const std::string error = std::isfinite(found.error) ? fmt::format(" ± {:.{}f}", scale * found.error, decimals) : "";
+  say(figure, text + ": " + allowed, fmt::format("{:.{}f}{}{}", scale * value, decimals, error, with_unit),
       value >= bounds.low && value <= bounds.high);
 }
 
 void Judge::say(const std::string& figure, const std::string& text, const std::string& number,
                 std::optional<bool> holds) {
-  out_->push_back({part_.plan->study->name, figure, text, number, holds});
+  std::size_t seeds = 0;  // of the curve that has fewest
+  for (const MeasuredCurve& curve : part_.curves)
+    if (!curve.runs.empty()) {
+      const std::size_t own = std::set(curve.seeds.begin(), curve.seeds.end()).size();
+      seeds = seeds == 0 ? own : std::min(seeds, own);
+    }
+  out_->push_back({part_.plan->study->name, figure, text, number, holds, static_cast<int>(seeds)});
 }
 
 double Judge::distance(const MeasuredCurve* a, const MeasuredCurve* b, const std::string& observable) {

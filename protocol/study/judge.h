@@ -16,6 +16,14 @@ struct Bounds {
   double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
 };
 
+// A number between means over seeds, with its standard error; NaN where it is not known.
+struct Estimate {
+  double value = no_value, error = no_value;
+  Estimate() = default;
+  Estimate(double v) : value(v) {}
+  Estimate(double v, double e) : value(v), error(e) {}
+};
+
 class Judge {
  public:
   Judge(const PartResults& part, std::vector<Statement>& out) : part_(part), out_(&out) {}
@@ -25,17 +33,22 @@ class Judge {
   // Unvaried curves; nullptr where there is none or none of its runs is done.
   const MeasuredCurve* reference() const;
   const MeasuredCurve* scaled(double radius, std::optional<double> a, std::optional<double> b) const;
-  std::vector<double> radii() const;                // of unvaried curves, without the reference's, increasing
+  bool planned(double radius, double a, double b) const;  // an unvaried curve of these powers, with runs or not
+  std::vector<double> radii() const;                // planned ones of unvaried curves, without the reference's, increasing
   std::vector<const MeasuredCurve*> plain() const;  // all unvaried curves with runs
+  bool plain_are_there() const;                     // every unvaried curve has runs
   bool is_plain(const MeasuredCurve& curve) const;  // nothing but radius and powers differs from the base
 
   // Mean over seeds of a scalar; NaN for nullptr and where no run has it.
   static double mean(const MeasuredCurve* curve, const std::string& scalar);
   static double deviation(const MeasuredCurve* curve, const std::string& scalar);  // over seeds; NaN below two
+  static Estimate estimate(const MeasuredCurve* curve, const std::string& scalar);
+  static Estimate ratio(const MeasuredCurve* a, const MeasuredCurve* b, const std::string& scalar);  // a over b
+  static Estimate minus(const MeasuredCurve* a, const MeasuredCurve* b, const std::string& scalar);  // a - b
   static std::string shown(const MeasuredCurve* curve, const std::string& scalar, double scale, int decimals);
 
   // A number that must lie in a band.
-  void number(const std::string& figure, const std::string& text, double value, Bounds bounds, int decimals,
+  void number(const std::string& figure, const std::string& text, Estimate value, Bounds bounds, int decimals,
               const std::string& unit = "", double scale = 1.0);
   void say(const std::string& figure, const std::string& text, const std::string& number, std::optional<bool> holds);
   void missing(const std::string& figure, const std::string& text) { say(figure, text, "no data", std::nullopt); }
@@ -58,7 +71,7 @@ void judge_figures_4_7(Judge& judge);
 void judge_figures_8_10(Judge& judge);
 void judge_figure_11(Judge& judge, const StudyPlan& plan);
 void judge_figures_12_14(Judge& judge);
-void judge_quasi_static(Judge& judge);
+void judge_quasi_static(Judge& judge, const StudyPlan& plan);
 void judge_similarity_2(Judge& judge);
 void judge_similarity_3(Judge& judge);
 void judge_friction_limit(Judge& judge);

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <set>
 #include <stdexcept>
+#include <tuple>
 
 #include "core/simulation.h"
 #include "protocol/case_document.h"
@@ -76,6 +77,12 @@ class Planner {
         return;
       }
     for (const CurveSpec& spec : study.curves) add_block(part, spec);
+    std::set<std::string> labels;
+    for (const PlannedCurve& curve : part.curves)
+      if (!labels.insert(curve.label).second)
+        problem(spec_of(part, curve).where, "curve", fmt::format("there are two curves \"{}\"; allowed: values that differ, in the digits shown too", curve.label));
+    if (labels.size() < part.curves.size()) return;
+    scans_have_powers(part);
     find_references(part);
     std::vector<std::size_t> order(part.curves.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
@@ -128,6 +135,23 @@ class Planner {
                   curve.label += fmt::format(" {}={}", last_key(key.key), plain_value(variant.at(key.key)));
               part.curves.push_back(std::move(curve));
             }
+  }
+
+  // At least three powers of the same size, else there is no minimum to look for.
+  void scans_have_powers(const PlannedPart& part) {
+    for (const ScanSpec& scan : part.study->scans) {
+      const bool stiffness = scan.power == ScanSpec::Power::stiffness;
+      std::map<std::tuple<double, double, std::map<std::string, std::string>>, std::set<double>> powers;
+      std::size_t most = 0;
+      for (const PlannedCurve& curve : part.curves) {
+        if (curve.radius == part.reference_radius || (!scan.curves.empty() && std::find(scan.curves.begin(), scan.curves.end(), curve.block) == scan.curves.end())) continue;
+        auto& own = powers[{curve.radius, stiffness ? curve.powers.adhesion : curve.powers.stiffness, curve.varied}];
+        own.insert(stiffness ? curve.powers.stiffness : curve.powers.adhesion);
+        most = std::max(most, own.size());
+      }
+      if (most < 3)
+        problem(scan.where, "scan.power", fmt::format("has {} values of the {} power at one size; allowed: at least three, at another radius than the reference's", most, stiffness ? "stiffness" : "adhesion"));
+    }
   }
 
   // A chain of matches would add up their tolerances.

@@ -143,6 +143,7 @@ class Runner {
     std::optional<double> steal;
     fs::path series;             // of its run folder
     double spheres = 0.0, particle_steps = 0.0;  // so far
+    fs::file_time_type born = fs::file_time_type::clock::now();
   };
 
   bool stopping() const { return options_.stop_signal != nullptr && *options_.stop_signal != 0; }
@@ -256,8 +257,7 @@ class Runner {
     } else if (is_done(options_.folder, job)) {
       outcome.state = JobState::done;
       outcome.exit_code = 0;
-      done_weight_ += job.weight;
-      done_seconds_ += outcome.wall_seconds;
+      take_time_of(job);
       if (child.steal) {
         if (const auto now = steal_seconds()) outcome.steal_seconds = *now - *child.steal;
         const nlohmann::json timing = {{"wall_seconds", outcome.wall_seconds},
@@ -278,9 +278,18 @@ class Runner {
 
   void keep(std::size_t k) {
     outcomes_[k].state = JobState::kept;
-    all_weight_ -= plan_.jobs[k].weight;
+    take_time_of(plan_.jobs[k]);
     ++finished_;
     if (options_.ended) options_.ended(plan_.jobs[k], outcomes_[k]);
+  }
+
+  // What a finished run cost: for the time that is left and for how far the guesses of the others are off.
+  void take_time_of(const Job& job) {
+    const nlohmann::json summary = nlohmann::json::parse(text_of(run_folder(options_.folder, job) / "summary.json"), nullptr, false);
+    const nlohmann::json performance = summary.is_object() ? summary.value("performance", nlohmann::json::object()) : nlohmann::json::object();
+    done_weight_ += job.weight;
+    done_steps_ += performance.value("particle_steps", job.weight);
+    done_seconds_ += performance.value("wall_seconds", 0.0);
   }
 
   void fail(std::size_t k, int exit_code, const std::string& message) {
@@ -296,8 +305,12 @@ class Runner {
   void look_at_children() {
     if (Clock::now() < next_look_) return;
     next_look_ = Clock::now() + std::chrono::seconds(1);
-    for (Child& child : children_)
+    for (Child& child : children_) {
+      std::error_code none;  // a series from before this child is that of an earlier attempt
+      const auto written = fs::last_write_time(child.series, none);
+      if (none || written < child.born) continue;
       if (const auto step = last_step(child.series)) child.particle_steps = child.spheres * *step;
+    }
   }
 
   void report() {
@@ -310,15 +323,18 @@ class Runner {
     p.wall_seconds = since(begin_);
     p.newest = newest_;
     look_at_children();
-    double under_way = 0.0, seconds = done_seconds_;  // what the running jobs have behind them, and the time that all took
+    // Guesses are off alike: what the finished runs took instead of theirs holds for the others too.
+    const double stretch = done_weight_ > 0.0 ? done_steps_ / done_weight_ : 1.0;
+    double under_way = 0.0, running_steps = 0.0, seconds = done_seconds_;
     for (const Child& child : children_) {
       if (child.attempt > 0) continue;
-      under_way += std::min(0.95 * plan_.jobs[child.job].weight, child.particle_steps);
+      running_steps += child.particle_steps;
+      under_way += std::min(0.97 * plan_.jobs[child.job].weight, child.particle_steps / stretch);
       seconds += since(child.begin);
     }
-    const double behind = done_weight_ + under_way;
-    if (behind > 0.005 * all_weight_ || done_weight_ > 0.0)
-      p.seconds_left = std::max(0.0, all_weight_ - behind) * seconds / behind /
+    const double behind = done_weight_ + under_way, steps = done_steps_ + running_steps;
+    if (steps > 0.0 && seconds > 1.0)
+      p.seconds_left = std::max(0.0, all_weight_ - behind) * stretch * seconds / steps /
                        std::max<double>(1.0, std::min<double>(options_.jobs, static_cast<double>(p.jobs - finished_)));
     p.fraction = all_weight_ > 0.0 ? behind / all_weight_ : 1.0;
     options_.progress(p);
@@ -332,7 +348,7 @@ class Runner {
   std::string newest_;
   std::vector<Child> children_;
   Clock::time_point begin_ = Clock::now(), next_look_ = begin_;
-  double all_weight_ = 0.0, done_weight_ = 0.0, done_seconds_ = 0.0;
+  double all_weight_ = 0.0, done_weight_ = 0.0, done_steps_ = 0.0, done_seconds_ = 0.0;
   std::size_t finished_ = 0, failed_ = 0;
 };
 

@@ -24,7 +24,7 @@ std::vector<Statement> judge(const StudyPlan& plan, const std::vector<PartResult
       if (group == "figures-8-10") judge_figures_8_10(judge);
       if (group == "figure-11") judge_figure_11(judge, plan);
       if (group == "figures-12-14") judge_figures_12_14(judge);
-      if (group == "quasi-static") judge_quasi_static(judge);
+      if (group == "quasi-static") judge_quasi_static(judge, plan);
       if (group == "similarity-2") judge_similarity_2(judge);
       if (group == "similarity-3") judge_similarity_3(judge);
       if (group == "friction-limit") judge_friction_limit(judge);
@@ -42,13 +42,13 @@ const char* verdict(const Statement& statement) {
 }
 
 std::string statements_markdown(const std::vector<Statement>& statements) {
-  std::string out = "| study | figure | statement | number | |\n|---|---|---|---|---|\n";
+  std::string out = "| study | figure | statement | number | seeds | |\n|---|---|---|---|---|---|\n";
   const auto cell = [](std::string text) {
     for (std::size_t at = 0; (at = text.find('|', at)) != std::string::npos; at += 2) text.replace(at, 1, "\\|");
     return text;
   };
   for (const Statement& s : statements)
-    out += fmt::format("| {} | {} | {} | {} | {} |\n", s.part, s.figure, cell(s.text), cell(s.number),
+    out += fmt::format("| {} | {} | {} | {} | {} | {} |\n", s.part, s.figure, cell(s.text), cell(s.number), s.seeds,
                        s.holds.value_or(true) ? verdict(s) : fmt::format("**{}**", verdict(s)));
   return out;
 }

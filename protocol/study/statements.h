@@ -15,7 +15,8 @@ struct Statement {
   std::string figure;         // "4", "filling", "S2"
   std::string text;           // what must hold
   std::string number;         // what was found
-  std::optional<bool> holds;  // empty: cannot be judged; `number` says why
+  std::optional<bool> holds;  // empty: cannot be judged, `number` says why, or a figure without a bar
+  int seeds = 0;              // of the curve of the study that has fewest
 };
 
 // Names that a study may ask for: figures-4-7, figures-8-10, figure-11, figures-12-14, quasi-static, similarity-2,

@@ -32,6 +32,13 @@ void inside_scatter(Judge& judge, const std::string& figure, const MeasuredCurve
             std::abs(change) <= scatter);
 }
 
+// Of the plate in the first compression.
+double loading_speed(const StudyPlan& plan, const MeasuredCurve& curve) {
+  for (const StageSpec& stage : plan.jobs[curve.planned->jobs.front()].c.stages)
+    if (stage.kind == StageKind::compress) return stage.speed;
+  return no_value;
+}
+
 // Strain over stress from the stress `zero` on, by the porosity: solid volume and area are constant, so that
 // h ~ 1/(1 - porosity).
 Curve strain_by_porosity(const Curve& porosity, double zero) {
@@ -90,9 +97,12 @@ void judge_figure_11(Judge& judge, const StudyPlan& plan) {
   }
 }
 
-void judge_quasi_static(Judge& judge) {
+void judge_quasi_static(Judge& judge, const StudyPlan& plan) {
   for (const MeasuredCurve& curve : judge.part().curves) {
-    if (curve.runs.empty()) continue;
+    if (curve.runs.empty()) {
+      judge.missing("quasi-static", curve.planned->label + ": strain rate, inertial number");
+      continue;
+    }
     judge.number("quasi-static", curve.planned->label + ": strain rate", Judge::mean(&curve, "strain_rate"),
                  {.high = 0.1}, 4, "1/s");
     const double from = Judge::mean(&curve, "quasi_static_stress");
@@ -108,7 +118,7 @@ void judge_quasi_static(Judge& judge) {
     inside_scatter(judge, "quasi-static", curve, reference, "strain_peak", "strain at the end of loading", 100.0, "%");
     inside_scatter(judge, "quasi-static", curve, reference, "strength", "strength", 1e-3, "kPa");
     const double change = std::abs(Judge::mean(&curve, "strain_peak") / Judge::mean(&reference, "strain_peak") - 1.0);
-    if (curve.planned->label.find("speed") != std::string::npos)
+    if (loading_speed(plan, curve) < loading_speed(plan, reference))
       judge.number("quasi-static", curve.planned->label + ": change of the strain at the end of loading, of it", change,
                    {.high = 0.02}, 2, "%", 100.0);
   }
@@ -172,58 +182,74 @@ void judge_similarity_3(Judge& judge) {
 void judge_friction_limit(Judge& judge) {
   for (const MeasuredCurve& curve : judge.part().curves) {
     const MeasuredCurve& reference = judge.part().curves[curve.planned->reference];
-    if (&reference == &curve || curve.runs.empty() || reference.runs.empty()) continue;
+    if (&reference == &curve) continue;
     judge.number("friction limit", fmt::format("{}: strength over that of {}", curve.planned->label, reference.planned->label),
-                 Judge::mean(&curve, "strength") / Judge::mean(&reference, "strength"), {.high = 0.75}, 2);
+                 Judge::ratio(&curve, &reference, "strength"), {.high = 0.75}, 2);
   }
 }
 
-// Does a curve answer as the one that it is compared with, by the bands of Fig. 8 and 10? And where sizes alone differ: how coarse may
-// spheres be?
+// Does a curve answer as the one that it is compared with, by the bands of Fig. 8 and 10? Only curves that follow the scaling law are
+// judged; for the others the figure stands without a bar. Where sizes alone differ: how coarse may spheres be?
 void judge_like_reference(Judge& judge) {
+  const std::string figure = "like the reference";
+  const PlannedPart& plan = *judge.part().plan;
+  const double wanted = 2.0 - plan.base.particles.law.exponent;  // docs/scaling.md
   struct Quantity {
     const char *scalar, *name;
     double band;
   };
   for (const Quantity& q : {Quantity{"strain_peak", "strain at the end of loading", 0.12}, Quantity{"strength", "unconfined strength", 0.15}}) {
-    std::map<double, bool> holds;  // radius -> of curves that differ in nothing else
-    const double wanted = 2.0 - judge.part().plan->base.particles.law.exponent;  // docs/scaling.md
+    std::map<double, std::optional<bool>> coarser;  // radius -> of curves that differ in nothing else; empty: no data
     for (const MeasuredCurve& curve : judge.part().curves) {
       const MeasuredCurve& reference = judge.part().curves[curve.planned->reference];
-      if (&reference == &curve || curve.runs.empty() || reference.runs.empty()) continue;
-      const double ratio = Judge::mean(&curve, q.scalar) / Judge::mean(&reference, q.scalar);
-      if (!std::isfinite(ratio)) continue;
-      judge.number("like the reference", fmt::format("{}: {} over that of {}", curve.planned->label, q.name, reference.planned->label), ratio,
-                   {1.0 - q.band, 1.0 + q.band}, 3);
-      const auto& powers = curve.planned->powers;
-      if (judge.is_plain(curve) && powers.stiffness == wanted && powers.adhesion == 2.0) holds[curve.planned->radius] = std::abs(ratio - 1.0) <= q.band;
+      if (&reference == &curve) continue;
+      const std::string text = fmt::format("{}: {} over that of {}", curve.planned->label, q.name, reference.planned->label);
+      const Estimate ratio = Judge::ratio(&curve, &reference, q.scalar);
+      const bool lawful = judge.is_plain(curve) && curve.planned->powers.stiffness == wanted && curve.planned->powers.adhesion == 2.0;
+      if (lawful) {
+        judge.number(figure, text, ratio, {1.0 - q.band, 1.0 + q.band}, 3);
+        if (curve.planned->radius > plan.reference_radius && reference.planned->radius == plan.reference_radius)
+          coarser[curve.planned->radius] = std::isfinite(ratio.value) ? std::optional(std::abs(ratio.value - 1.0) <= q.band) : std::nullopt;
+      } else if (std::isfinite(ratio.value)) {
+        judge.say(figure, text, fmt::format("{:.3f}{}", ratio.value, std::isfinite(ratio.error) ? fmt::format(" ± {:.3f}", ratio.error) : ""), std::nullopt);
+      } else {
+        judge.missing(figure, text);
+      }
     }
-    if (holds.size() < 2) continue;
+    if (coarser.size() < 2) continue;
     double coarsest = 0.0;
-    for (const auto& [R, held] : holds) {
-      if (!held) break;
+    bool all = true;
+    for (const auto& [R, holds] : coarser) {
+      all = all && holds.value_or(false);
+      if (!all) break;
       coarsest = R;
     }
-    const BoxSpec& box = judge.part().plan->base.box;
-    judge.say("like the reference", fmt::format("coarsest size up to which the {} stays within {:g} %", q.name, 100.0 * q.band),
-              coarsest > 0.0 ? fmt::format("{}, box over diameter {:.3g}", size_text(coarsest), std::min(box.width, box.depth) / (2.0 * coarsest)) : "none",
-              coarsest > 0.0);
+    const BoxSpec& box = plan.base.box;
+    // Radii of a distribution are stretched alike.
+    const double largest = plan.base.particles.sizes.largest() / plan.reference_radius;
+    judge.say(figure, fmt::format("coarsest size of those tried up to which the {} stays within {:g} %", q.name, 100.0 * q.band),
+              coarsest > 0.0 ? fmt::format("{}{}, box over largest diameter {:.3g}", all ? "at least " : "", size_text(coarsest),
+                                           std::min(box.width, box.depth) / (2.0 * coarsest * largest))
+                             : "none",
+              std::nullopt);
   }
 }
 
 void judge_cross_checks(Judge& judge) {
   for (const MeasuredCurve& curve : judge.part().curves) {
-    if (curve.runs.empty()) continue;
     const std::string& label = curve.planned->label;
+    if (curve.runs.empty()) {
+      judge.missing("checks", label + ": weight on the bottom, overlaps");
+      continue;
+    }
     const double weight = Judge::mean(&curve, "weight_over_area");
-    const double difference = Judge::mean(&curve, "stress_difference"),
-                 unloaded = Judge::mean(&curve, "stress_difference_unloaded");
-    if (std::isfinite(difference))
-      judge.number("checks", label + ": bottom minus top stress over weight/area, end of loading", difference / weight,
-                   {0.98, 1.02}, 4);
-    if (std::isfinite(unloaded))
-      judge.number("checks", label + ": bottom minus top stress over weight/area, end of unloading", unloaded / weight,
-                   {0.98, 1.02}, 4);
+    const auto check = [&](const char* scalar, const std::string& text) {
+      const Estimate e = Judge::estimate(&curve, scalar);
+      if (std::isfinite(e.value)) judge.number("checks", label + ": " + text, {e.value / weight, e.error / weight}, {0.98, 1.02}, 4);
+    };
+    check("stress_difference", "bottom minus top stress over weight/area, loading while the inertial number is below 1e-4");
+    check("stress_difference_unloaded", "bottom minus top stress over weight/area, unloading while the inertial number is below 1e-4");
+    check("stress_bottom_released", "bottom stress over weight/area, freed and at rest");
     const double overlap = Judge::mean(&curve, "largest_overlap");
     if (std::isfinite(overlap))
       judge.number("checks", label + ": largest overlap over the diameter", overlap, {.high = 0.25}, 1, "%", 100.0);
@@ -239,14 +265,14 @@ void judge_scans(Judge& judge) {
     if (std::find(scan.powers.begin(), scan.powers.end(), wanted) != scan.powers.end())
       judge.say("scan", fmt::format("{}: {:g} has the least collapse error of the tried ones", what, wanted),
                 fmt::format("{:g}", scan.best_tried), scan.best_tried == wanted);
-    const std::string text = fmt::format("{}: the minimum lies at {:g}, within twice its uncertainty", what, wanted);
+    const std::string text = fmt::format("{}: the minimum lies at {:g}, within its 95 % interval", what, wanted);
     if (!scan.minimum || !scan.minimum->inside)
-      judge.say("scan", text, "no minimum inside the scan", std::nullopt);
+      judge.say("scan", text, "no minimum inside the scan", false);
     else if (!std::isfinite(scan.minimum->uncertainty))
       judge.say("scan", text, fmt::format("{:.3f} (uncertainty unknown)", scan.minimum->power), std::nullopt);
     else
-      judge.say("scan", text, fmt::format("{:.3f} +- {:.3f}", scan.minimum->power, scan.minimum->uncertainty),
-                std::abs(scan.minimum->power - wanted) <= 2.0 * scan.minimum->uncertainty);
+      judge.say("scan", text, fmt::format("{:.3f} ± {:.3f}", scan.minimum->power, scan.minimum->uncertainty),
+                std::abs(scan.minimum->power - wanted) <= (scan.minimum->degrees > 0 ? student_975(scan.minimum->degrees) : 2.0) * scan.minimum->uncertainty);
   }
 }
 

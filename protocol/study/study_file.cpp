@@ -262,6 +262,7 @@ void read_own(TableReader& root, TableReader& head, Study& study, Problems& prob
     ScanSpec scan;
     std::size_t power = 0;
     table.word("power", {"stiffness", "adhesion"}, Need::required, power);
+    scan.where = table.where("");
     scan.power = power == 0 ? ScanSpec::Power::stiffness : ScanSpec::Power::adhesion;
     words(table, "curves", names, scan.curves);
     words(table, "observables", known, scan.observables);

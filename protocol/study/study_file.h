@@ -40,6 +40,7 @@ struct FigureSpec {
 
 // [[scan]]: the power of least collapse error.
 struct ScanSpec {
+  Position where;
   enum class Power { stiffness, adhesion };
   Power power = Power::stiffness;
   std::vector<std::string> curves;       // names of [[curve]]; empty: all

@@ -104,13 +104,13 @@ void write_collapse(const fs::path& file, const PartResults& part) {
 
 void write_scans(const fs::path& file, const PartResults& part) {
   std::string text =
-      "scanned power,radius [m],other power [-],observable,powers,errors over range [-],best "
+      "scanned power,radius [m],other power [-],observable,seeds,powers,errors over range [-],best "
       "tried,minimum,uncertainty,error at minimum,inside\n";
   for (const ScanResult& scan : part.scans) {
     const bool found = scan.minimum.has_value();
     text += fmt::format(
-        "{},{},{},{},{},{},{},{},{},{},{}\n", scan.power == ScanSpec::Power::stiffness ? "stiffness" : "adhesion",
-        cell(scan.radius), cell(scan.other_power), scan.observable, list(scan.powers), list(scan.errors),
+        "{},{},{},{},{},{},{},{},{},{},{},{}\n", scan.power == ScanSpec::Power::stiffness ? "stiffness" : "adhesion",
+        cell(scan.radius), cell(scan.other_power), scan.observable, scan.seeds, list(scan.powers), list(scan.errors),
         cell(scan.best_tried), found ? cell(scan.minimum->power) : "", found ? cell(scan.minimum->uncertainty) : "",
         found ? cell(scan.minimum->error) : "", found ? (scan.minimum->inside ? "yes" : "no") : "");
   }
@@ -210,6 +210,9 @@ void write_run_table(const fs::path& folder, const StudyPlan& plan, const std::v
 
 void write_part_tables(const fs::path& folder, const StudyPlan& plan, const PartResults& part) {
   const fs::path own = part_folder(folder, plan, *part.plan), tables = own / "tables";
+  // What an earlier form of the study left there must not stand beside the new.
+  std::error_code ignored;
+  fs::remove_all(tables, ignored), fs::remove_all(own / "figures", ignored);
   make_folder(tables);
   for (const std::string& observable : part.plan->study->observables) write_curves(tables, part, observable);
   write_scalars(tables / "scalars.csv", part);
@@ -221,9 +224,9 @@ void write_part_tables(const fs::path& folder, const StudyPlan& plan, const Part
 
 void write_statements(const fs::path& folder, const std::vector<Statement>& statements) {
   write_whole_file(folder / "statements.md", statements_markdown(statements));
-  std::string text = "study,figure,statement,number,verdict\n";
+  std::string text = "study,figure,statement,number,seeds,verdict\n";
   for (const Statement& s : statements)
-    text += fmt::format("{},{},{},{},{}\n", cell(s.part), cell(s.figure), cell(s.text), cell(s.number), verdict(s));
+    text += fmt::format("{},{},{},{},{},{}\n", cell(s.part), cell(s.figure), cell(s.text), cell(s.number), s.seeds, verdict(s));
   write_whole_file(folder / "statements.csv", text);
 }
 
