@@ -28,9 +28,9 @@ bool read_stiffness_alternative(TableReader& law, std::string_view key, const Pa
   TableReader data = law.table(key);
   double E = 0.0, nu = 0.0, V = 0.0, R = 0.0;
   bool good = data.quantity("young_modulus", Quantity::stress, positive, Need::required, E);
-  const bool impact = data.has("impact_speed") || data.has("poisson_ratio");
-  if (impact) {
-    good &= data.quantity("impact_speed", Quantity::speed, positive, Need::required, V);
+  const bool impact = data.has("impact_speed"), plane = data.has("poisson_ratio");
+  if (impact) good &= data.quantity("impact_speed", Quantity::speed, positive, Need::required, V);
+  if (impact || plane) {
     good &= data.number("poisson_ratio", Range{-1.0, 0.5, false, true}, Need::required, nu);
   }
   data.refuse_unknown("a stiffness by material data");
@@ -41,11 +41,12 @@ bool read_stiffness_alternative(TableReader& law, std::string_view key, const Pa
   if (!one_radius(law, key, particles, R) || !good) return false;
   if (impact && !(particles.density > 0.0)) {
     law.error(key,
-              "is given by an impact speed, which needs particles.density; allowed: leave impact_speed and "
-              "poisson_ratio out");
+              "is given by an impact speed, which needs particles.density; allowed: leave impact_speed out");
     return false;
   }
-  out = impact ? stiffness_of_impact(R, particles.density, E, nu, V) : stiffness_of_modulus(R, E);
+  out = impact  ? stiffness_of_impact(R, particles.density, E, nu, V)
+        : plane ? stiffness_of_contact(R, E, nu)
+                : stiffness_of_modulus(R, E);
   return true;
 }
 

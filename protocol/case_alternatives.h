@@ -10,7 +10,7 @@ namespace platen {
 // Whether `key` of the table is a table itself.
 bool is_table(TableReader& table, std::string_view key);
 
-// { young_modulus } or { young_modulus, poisson_ratio, impact_speed }, for exponent 1 and spheres of one radius; the
+// { young_modulus }, { young_modulus, poisson_ratio } or { young_modulus, poisson_ratio, impact_speed }, for exponent 1 and spheres of one radius; the
 // latter needs the density. Returns true and sets `out` [N/m] where all is well; what is wrong goes to the problems.
 bool read_stiffness_alternative(TableReader& law, std::string_view key, const ParticleSpec& particles, double exponent,
                                 double& out);

@@ -116,6 +116,10 @@ double stiffness_of_impact(double radius, double density, double young_modulus, 
   return 16.0 / 15.0 * hertz * std::pow(15.0 * m * speed * speed / (16.0 * hertz), 0.2);
 }
 
+double stiffness_of_contact(double radius, double young_modulus, double poisson_ratio) {
+  return effective_modulus(young_modulus, poisson_ratio) * radius;
+}
+
 double stiffness_of_modulus(double radius, double young_modulus) { return 0.5 * pi * radius * young_modulus; }
 
 double f0_of_surface_energy(double radius, double surface_energy, AdhesionModel model, double flattening) {

@@ -3,7 +3,7 @@
 //   lambda = R / R_ref
 //   k1, k2, k_adh   ~ lambda^a     a = "stiffness";  k_t follows, it is a fixed part of k1   [Thakur2016, Eq. 12-15]
 //   f0              ~ lambda^b     b = "adhesion"                                            [Thakur2016, Eq. 16-22]
-//   beta_n          ~ lambda^c     only where c = "dashpots" is given; else restitution is kept and c = (3 + a)/2
+//   beta_n          ~ lambda^c     only where c = "dashpots" is given; else restitution is kept and c = (2 + a + n)/2
 //   N               = round(N_ref / lambda^3)               equal solid volume in the box    [A20 in docs/scaling.md]
 // Density, friction, rolling friction and the plates' law are kept.
 //
@@ -52,6 +52,9 @@ double effective_modulus(double young_modulus, double poisson_ratio);
 //   k = 16/15 sqrt(R*) E* (15 m* V^2 / (16 sqrt(R*) E*))^(1/5),  equal spheres: R* = R/2, m* = m/2.
 // k ~ R at equal speed V and density. [N/m]; R [m], density [kg/m3], E [Pa], V [m/s].
 double stiffness_of_impact(double radius, double density, double young_modulus, double poisson_ratio, double speed);
+
+// Twice the effective modulus over the effective radius [Thakur2016, Eq. 14]: k = 2 E* R*, equal spheres, R* = R/2. [N/m]
+double stiffness_of_contact(double radius, double young_modulus, double poisson_ratio);
 
 // Tangent of a cylinder of the sphere's section between two centres [Thakur2016, Eq. 15; PFC]: k = pi R E / 2. [N/m]
 double stiffness_of_modulus(double radius, double young_modulus);

@@ -168,6 +168,8 @@ TEST(Scaling, CasesByMaterialData) {
   const Case c = base_case({"particles.law.k1={ young_modulus = \"0.7 MPa\" }",
                             "particles.law.f0={ surface_energy = \"0.05 J/m2\", model = \"jkr\" }"});
   EXPECT_TRUE(same(c.particles.law.k1, stiffness_of_modulus(2.5e-3, 7e5)));
+  // 2 E* R* = E / (1 - nu^2) R / 2 [Thakur2016, Eq. 14].
+  EXPECT_TRUE(same(base_case({"particles.law.k1={ young_modulus = \"0.7 MPa\", poisson_ratio = 0.3 }"}).particles.law.k1, 7e5 / (1.0 - 0.09) * 1.25e-3));
   EXPECT_TRUE(same(c.particles.law.f0, f0_of_surface_energy(2.5e-3, 0.05, AdhesionModel::jkr)));
   const Case impact =
       base_case({"particles.law.k1={ young_modulus = \"7 MPa\", poisson_ratio = 0.3, impact_speed = \"0.3 m/s\" }"});
