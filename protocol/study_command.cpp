@@ -7,9 +7,9 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <set>
 #include <cerrno>
 #include <cstdio>
+#include <set>
 
 #include "protocol/experiment.h"
 #include "protocol/output/files.h"
@@ -60,8 +60,9 @@ void refuse_foreign_folder(const fs::path& folder) {
   std::error_code ignored;
   if (!fs::exists(folder, ignored) || fs::exists(folder / "study.toml", ignored)) return;
   if (!fs::is_directory(folder, ignored)) throw OutputError(folder.string() + ": is not a folder");
+  // Killed in its first moments a study leaves the unfinished study.toml.
   for (const auto& entry : fs::directory_iterator(folder))
-    if (entry.path().filename() != ".lock")
+    if (entry.path().filename() != ".lock" && entry.path().filename() != temporary_name("study.toml"))
       throw OutputError(folder.string() + ": is not empty and holds no study; choose another folder (-o)");
 }
 

@@ -331,6 +331,16 @@ TEST(Study, EndToEndAndKilledAtRandomPoints) {
   EXPECT_EQ(tables_of(study.folder / "killed"), expected);
 }
 
+TEST(Study, KilledInItsFirstMomentItGoesOn) {
+  const StudyFolder study(study_text, base_text);
+  fs::create_directory(study.folder / "out");
+  write_file(study.folder / "out/.lock", "");
+  write_file(study.folder / "out/study.toml.tmp", "[stu");
+  const ProgramResult result = run_program(study.words("out"));
+  EXPECT_EQ(result.exit_code, 0) << result.report();
+  EXPECT_FALSE(fs::exists(study.folder / "out/study.toml.tmp"));
+}
+
 // A finished run that was damaged later: the tables of the others are written, and the message says what helps.
 TEST(Study, ADamagedRunIsLeftOut) {
   const StudyFolder study(study_text, base_text);

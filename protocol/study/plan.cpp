@@ -32,6 +32,14 @@ std::string path_part(const std::string& text) {
 
 std::string last_key(const std::string& path) { return path.substr(path.rfind('.') + 1); }
 
+// A key as a part of a folder's name: enough of it that two keys with the same ending never share a name, which would then depend on the
+// order of the curves.
+std::string folder_key(const std::string& key) {
+  if (key.starts_with("particles.law.")) return last_key(key);
+  const std::size_t last = key.rfind('.'), before = last == std::string::npos || last == 0 ? std::string::npos : key.rfind('.', last - 1);
+  return before == std::string::npos ? key : key.substr(before + 1);
+}
+
 std::string plain_value(std::string toml) {
   std::erase(toml, '"');
   return toml;
@@ -233,10 +241,9 @@ class Planner {
     const bool scaled = curve.radius != part.reference_radius;
     if (scaled) name += fmt::format("-a{:g}-b{:g}", curve.powers.stiffness, curve.powers.adhesion);
     if (scaled && curve.powers.time_step != 0.0) name += fmt::format("-dt{:g}", curve.powers.time_step);
-    for (const auto& [key, value] : curve.varied) name += "-" + path_part(last_key(key) + "=" + plain_value(value));
+    for (const auto& [key, value] : curve.varied) name += "-" + path_part(folder_key(key) + "=" + plain_value(value));
     for (const std::string& text : spec.set)
-      name += "-" +
-              path_part(last_key(text.substr(0, text.find('='))) + "=" + plain_value(text.substr(text.find('=') + 1)));
+      name += "-" + path_part(folder_key(text.substr(0, text.find('='))) + "=" + plain_value(text.substr(text.find('=') + 1)));
     if (matched_to) name += "-matched";
     name += fmt::format("-s{}", seed);
     if (repeat > 0) name += fmt::format("-t{}", repeat);
