@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -93,6 +94,10 @@ int run_command(const RunCommand& command) {
   if (!command.quiet)
     spdlog::info("{}: {} spheres, {} stages, {} thread{}, into {}", command.case_file.filename().string(), c.particles.count,
                  c.stages.size(), options.threads, options.threads == 1 ? "" : "s", path.string());
+
+  const auto wants_frames = [](const StageSpec& stage) { return stage.frames.value_or(0.0) > 0.0; };
+  if (c.output.frames || std::any_of(c.stages.begin(), c.stages.end(), wants_frames))
+    spdlog::warn("{}: output.frames: this version does not write frames yet; everything else is written", command.case_file.filename().string());
 
   const RunOutcome outcome = run_experiment(c, folder, options);
   printer.clear();
