@@ -8,7 +8,7 @@ Between `<!-- KIND WHAT -->` and `<!-- end -->` everything is written anew; noth
     figure N        the study's image, copied to docs/results/, and the statements on that figure
     statements WHAT the statements of a figure column: filling, S2, checks, ...
     collapse        collapse errors of all curves
-    runs            steps, time steps, ledger and wall time of every run
+    runs            steps, time steps, ledger and wall time of every run, times of every seed
     total           how many statements hold
 """
 import csv
@@ -16,6 +16,7 @@ import json
 import re
 import shutil
 import sys
+from datetime import datetime
 from pathlib import Path
 
 DOCS = Path(__file__).resolve().parent
@@ -65,7 +66,7 @@ class Study:
         return markdown(["study", "curve", "observable", "seeds", "error", "scatter", "over range", "over seed scatter"], rows)
 
     def runs(self):
-        rows, seconds = [], 0.0
+        rows, spans = [], {}  # seed -> runs, seconds of one thread, first start, last end
         for run in table(self.folder / "runs.csv"):
             file = self.folder / "runs" / run["run"] / "summary.json"
             if not file.exists():
@@ -76,12 +77,16 @@ class Study:
             steps = [s["time_step"] for s in stages if "largest" in s.get("time_step", {})]
             pressed = [s["energy_residual_share"] for s in stages if s["kind"] == "compress" and "energy_residual_share" in s]
             wall = summary["performance"]["wall_seconds"]
-            seconds += wall
+            times = [json.loads(line)["timestamp"] for line in (file.parent / "log.jsonl").read_text(encoding="utf-8").splitlines()]
+            span = spans.setdefault(run["seed"], [0, 0.0, min(times), max(times)])
+            span[:] = [span[0] + 1, span[1] + wall, min(span[2], *times), max(span[3], *times)]
             rows.append((run["run"], run["spheres"], f"{sum(s['time'] for s in stages):.2f}", sum(s["steps"] for s in stages),
                          f"{1e6 * min(s['smallest'] for s in steps):.1f} to {1e6 * max(s['largest'] for s in steps):.1f}" if steps else "",
                          f"{pressed[0]:.1e}" if pressed else "", f"{wall / 60:.1f}"))
         header = ["run", "spheres", "simulated s", "steps", "time step us", "ledger residual, compress", "wall min"]
-        return markdown(header, rows) + f"\n\nTogether {seconds / 3600:.2f} h of one thread."
+        minutes = lambda text: datetime.fromisoformat(text.replace("Z", "+00:00")).timestamp() / 60
+        seeds = [(seed, count, f"{seconds / 3600:.2f}", f"{minutes(last) - minutes(first):.0f}") for seed, (count, seconds, first, last) in spans.items()]
+        return markdown(header, rows) + "\n\n" + markdown(["seed", "runs", "h of one thread", "min from the first start to the last end"], seeds)
 
     def total(self):
         count = lambda verdict: sum(s["verdict"] == verdict for s in self.statements)

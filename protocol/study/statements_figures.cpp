@@ -33,8 +33,6 @@ double span(const std::vector<const MeasuredCurve*>& curves, const std::string& 
   return curves.size() < 2 ? no_value : high - low;
 }
 
-Estimate ratio(const MeasuredCurve* a, const MeasuredCurve* b, const std::string& scalar) { return Judge::ratio(a, b, scalar); }
-
 // The size of a - b.
 Estimate apart(const MeasuredCurve* a, const MeasuredCurve* b, const std::string& scalar) {
   const Estimate d = Judge::minus(a, b, scalar);
@@ -115,9 +113,9 @@ void judge_figures_4_7(Judge& judge) {
     const MeasuredCurve* scaled = judge.scaled(R, 1.0, std::nullopt);
     const MeasuredCurve* unscaled = judge.scaled(R, 0.0, std::nullopt);
     judge.number("4", size + " scaled: strain at the end of loading over the reference's",
-                 ratio(scaled, ref, "strain_peak"), {0.9, 1.1}, 3);
+                 Judge::ratio(scaled, ref, "strain_peak"), {0.9, 1.1}, 3);
     judge.number("4", size + ": unscaled is softer, strain over the scaled one's",
-                 ratio(unscaled, scaled, "strain_peak"), {1.2, 1.45}, 3);
+                 Judge::ratio(unscaled, scaled, "strain_peak"), {1.2, 1.45}, 3);
     judge.number("5", size + " scaled: distance of the porosity at the end of loading from the reference's",
                  apart(scaled, ref, "porosity_peak"), {.high = 0.006}, 4);
     judge.number("5", size + " unscaled: porosity at the end of loading lower than the reference's by",
@@ -154,13 +152,13 @@ void judge_figures_8_10(Judge& judge) {
     const MeasuredCurve* quadratic = judge.scaled(R, 1.0, 2.0);
     const MeasuredCurve* cubic = judge.scaled(R, 1.0, 3.0);
     judge.number("8", size + " quadratic: strain at the end of loading over the reference's",
-                 ratio(quadratic, ref, "strain_peak"), {0.88, 1.12}, 3);
+                 Judge::ratio(quadratic, ref, "strain_peak"), {0.88, 1.12}, 3);
     judge.number("9", size + " quadratic: distance of the porosity at the strain zero from the reference's",
                  apart(quadratic, ref, "porosity_at_zero"), {.high = 0.015}, 4);
-    judge.number("10", size + " quadratic: strength over the reference's", ratio(quadratic, ref, "strength"),
+    judge.number("10", size + " quadratic: strength over the reference's", Judge::ratio(quadratic, ref, "strength"),
                  {0.85, 1.15}, 3);
     judge.number("10", size + " quadratic: initial stiffness over the reference's",
-                 ratio(quadratic, ref, "initial_stiffness"), {0.85, 1.15}, 3);
+                 Judge::ratio(quadratic, ref, "initial_stiffness"), {0.85, 1.15}, 3);
     if (!judge.planned(R, 1.0, 1.0) && !judge.planned(R, 1.0, 3.0)) continue;
     // Spheres smaller than the reference turn the order round.
     const double sign = R > judge.part().plan->reference_radius ? 1.0 : -1.0;
@@ -188,8 +186,8 @@ void judge_figures_8_10(Judge& judge) {
       const double a = std::pow(low, steps), b = std::pow(high, steps);
       return Bounds{std::min(a, b), std::max(a, b)};
     };
-    judge.number("10", size + ": strength, linear over quadratic", ratio(linear, quadratic, "strength"), band(0.45, 0.8), 3);
-    judge.number("10", size + ": strength, cubic over quadratic", ratio(cubic, quadratic, "strength"), band(1.25, 1.65), 3);
+    judge.number("10", size + ": strength, linear over quadratic", Judge::ratio(linear, quadratic, "strength"), band(0.45, 0.8), 3);
+    judge.number("10", size + ": strength, cubic over quadratic", Judge::ratio(cubic, quadratic, "strength"), band(1.25, 1.65), 3);
   }
   for (const MeasuredCurve* curve : judge.plain()) {
     const double f0 =
@@ -219,7 +217,7 @@ void judge_figures_12_14(Judge& judge) {
   for (const double R : judge.radii()) {
     const std::string size = size_text(R);
     const MeasuredCurve* scaled = judge.scaled(R, 1.0, std::nullopt);
-    judge.number("12", size + ": strain at the end of loading over the reference's", ratio(scaled, ref, "strain_peak"),
+    judge.number("12", size + ": strain at the end of loading over the reference's", Judge::ratio(scaled, ref, "strain_peak"),
                  {0.9, 1.1}, 3);
     judge.number("12", size + ": slightly lower peak strain, reference minus scaled", Judge::minus(ref, scaled, "strain_peak"),
                  {.low = 0.0}, 2, "%", 100.0);
@@ -232,7 +230,7 @@ void judge_figures_12_14(Judge& judge) {
       judge.say("13", converging, fmt::format("{:.4f} at 1 kPa, {:.4f} at the end", start, end), end <= start);
     else
       judge.missing("13", converging);
-    judge.number("14", size + ": initial stiffness over the reference's", ratio(scaled, ref, "initial_stiffness"),
+    judge.number("14", size + ": initial stiffness over the reference's", Judge::ratio(scaled, ref, "initial_stiffness"),
                  {0.85, 1.15}, 3);
     const Estimate strength = Judge::ratio(scaled, ref, "strength");
     judge.number("14", size + ": strength over the reference's, less one (the paper: -9.5 %)", {strength.value - 1.0, strength.error}, {-0.15, 0.15}, 1, "%", 100.0);
