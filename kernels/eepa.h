@@ -70,33 +70,46 @@ PLATEN_INLINE NormalResponse<I> normal_response(typename I::Real s, typename I::
   return {sp, f_hys, height};
 }
 
+// The tangential spring before its limit, and what is needed to cut it and to say what the cut takes.
 template <class I>
-struct TangentialResponse {
-  Vec3<I> spring;                   // T after the step [N]
+struct TrialSpring {
+  Vec3<I> T;                        // [N]
+  typename I::Real size2;           // |T|^2 [N2]
+  typename I::Real was2;            // |T|^2 of the step before [N2]
+  typename I::Real along;           // T . (spring before the advance, turned) [N2]
+};
+
+// Turns the stored spring into the tangent plane of normal n keeping its length, and advances it by -k_t v_t dt [Eq. 5].
+template <class I, bool exact>
+PLATEN_INLINE TrialSpring<I> trial_spring(const Vec3<I>& T_old, const Vec3<I>& n, const Vec3<I>& v_t, typename I::Real k_t, double dt) {
+  using Real = typename I::Real;
+  const Vec3<I> flat = sub_scaled<I>(T_old, dot(T_old, n), n);
+  const Real was2 = dot(T_old, T_old), product = was2 * dot(flat, flat);
+  // length/|flat| = length^2 / sqrt(length^2 |flat|^2); springs too small to square are left as they are.
+  const Real tiny = I::set(0x1p-900);
+  const Real stretch = I::where(product > tiny, was2 * inverse_sqrt<I, exact>(I::max(product, tiny)), I::set(1.0));
+  const Vec3<I> T = sub_scaled<I>(scale<I>(stretch, flat), k_t * I::set(dt), v_t);
+  return {T, dot(T, T), was2, stretch * dot(flat, T)};
+}
+
+template <class I>
+struct LimitedSpring {
+  Vec3<I> T;                        // after the step [N]
   typename I::Mask cut;             // the limit holds: sliding
   typename I::Real loss;            // 2 k_t times the energy that sliding takes [N2]
 };
 
-// Turns the stored spring into the tangent plane of normal n keeping its length, advances it by -k_t v_t dt, and cuts it
-// back to the limit [Eq. 5, 9, 10].
+// Cuts a spring back to the limit [Eq. 9, 10].
 template <class I, bool exact>
-PLATEN_INLINE TangentialResponse<I> tangential_response(const Vec3<I>& T_old, const Vec3<I>& n, const Vec3<I>& v_t,
-                                                        typename I::Real k_t, typename I::Real limit, double dt) {
+PLATEN_INLINE LimitedSpring<I> limited_spring(const TrialSpring<I>& trial, typename I::Real limit) {
   using Real = typename I::Real;
-  const Vec3<I> flat = sub_scaled<I>(T_old, dot(T_old, n), n);
-  const Real length2 = dot(T_old, T_old), product = length2 * dot(flat, flat);
-  // length/|flat| = length2 / sqrt(length2 |flat|^2); springs too small to square are left as they are.
-  const Real tiny = I::set(0x1p-900);
-  const Real stretch =
-      I::where(product > tiny, length2 * inverse_sqrt<I, exact>(I::max(product, tiny)), I::set(1.0));
-  const Vec3<I> trial = sub_scaled<I>(scale<I>(stretch, flat), k_t * I::set(dt), v_t);
-  const Real trial2 = dot(trial, trial), limit2 = limit * limit;
-  const auto cut = trial2 >= limit2;  // also where both are 0: no dashpot on a frictionless contact
-  const Real back = I::where(cut, limit * inverse_sqrt<I, exact>(I::max(trial2, tiny)), I::set(1.0));
+  const Real limit2 = limit * limit;
+  const auto cut = trial.size2 >= limit2;  // also where both are 0: no dashpot on a frictionless contact
+  const Real back = I::where(cut, limit * inverse_sqrt<I, exact>(I::max(trial.size2, I::set(0x1p-900))), I::set(1.0));
   // Work of the mean of the old and the new spring over the slip that did not stretch it: (T_old + T)(T_trial - T).
   const Real over = I::set(1.0) - back;
-  const Real loss = I::where(cut, over * I::fma(back, trial2, stretch * dot(flat, trial)), I::set(0.0));
-  return {scale<I>(back, trial), cut, loss};
+  const Real loss = I::where(cut, over * I::fma(back, trial.size2, trial.along), I::set(0.0));
+  return {scale<I>(back, trial.T), cut, loss};
 }
 
 // Energy that plastic flow takes when s_p goes from `sp_old` to `sp`: a function of s_p alone, hence exact for any step

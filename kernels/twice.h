@@ -82,6 +82,21 @@ struct Twice {
   static PLATEN_INLINE Record add(const Record& a, const Record& b) { return I::add(a, b); }
 };
 
+// What sums over vectors of I are kept in: single vectors, which take half the registers.
+template <class I>
+struct SingleOf {
+  using Type = I;
+  static PLATEN_INLINE typename I::Real sum(const typename I::Real& x) { return x; }
+  // The second operand where the first is not a number.
+  static PLATEN_INLINE typename I::Real min(const typename I::Real& x, const typename I::Real& y) { return I::min(x, y); }
+};
+template <class I>
+struct SingleOf<Twice<I>> {
+  using Type = I;
+  static PLATEN_INLINE typename I::Real sum(const typename Twice<I>::Real& x) { return x.a + x.b; }
+  static PLATEN_INLINE typename I::Real min(const typename Twice<I>::Real& x, const typename I::Real& y) { return I::min(x.a, I::min(x.b, y)); }
+};
+
 // What the law runs on. AVX2 has too few registers for two vectors at once [docs/decisions.md].
 template <class I>
 struct Interleaved {

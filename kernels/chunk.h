@@ -1,0 +1,105 @@
+// What the phases of the contact kernel hand on.
+#pragma once
+
+#include <cstddef>
+
+#include "kernels/scene.h"
+#include "kernels/vec3.h"
+#include "kernels/views.h"
+
+namespace platen {
+
+// Geometry and relative motion of `width` pairs. The normal points from j to i.
+template <class I>
+struct Pairs {
+  typename I::Real delta;                    // overlap [m]
+  Vec3<I> n;                                 // unit normal
+  typename I::Real v_n;                      // normal relative velocity, positive when parting [m/s]
+  Vec3<I> v_t;                               // tangential relative velocity at the contact point [m/s]
+  typename I::Real lever_i, lever_j;         // a/R [-]
+  typename I::Real R_i, R_j, m_i, m_j;       // unequal spheres only
+  Vec3<I> w;                                 // relative spin [rad/s], relative rolling only
+};
+
+// What the phases hand on, for one chunk: small enough to stay in the first cache.
+//
+//   fetch  ->  delta n v_n v_t lever (R m w)  ->  law  ->  F T S  ->  output
+template <SceneTraits scene>
+struct Chunk {
+  static constexpr int sides = scene.equal_spheres ? 1 : 2;  // of unequal spheres, each has its own
+  using Column = double[chunk_size];
+  alignas(64) Column delta;
+  alignas(64) Column n[3];
+  alignas(64) Column v_n;
+  alignas(64) Column v_t[3];
+  alignas(64) Column lever[sides];
+  alignas(64) Column R[2], m[2], w[3];
+  alignas(64) Column F[3];
+  alignas(64) Column T[sides][3];
+  alignas(64) Column S[sides];
+
+  template <class I>
+  static PLATEN_INLINE void put(Column (&to)[3], int at, const Vec3<I>& a) {
+    I::store(to[0] + at, a.x), I::store(to[1] + at, a.y), I::store(to[2] + at, a.z);
+  }
+  template <class I>
+  static PLATEN_INLINE Vec3<I> take(const Column (&from)[3], int at) {
+    return {I::load(from[0] + at), I::load(from[1] + at), I::load(from[2] + at)};
+  }
+
+  template <class I>
+  PLATEN_INLINE void put_pairs(int at, const Pairs<I>& p) {
+    I::store(delta + at, p.delta), I::store(v_n + at, p.v_n), I::store(lever[0] + at, p.lever_i);
+    put<I>(n, at, p.n), put<I>(v_t, at, p.v_t);
+    if constexpr (!scene.equal_spheres) {
+      I::store(lever[1] + at, p.lever_j);
+      I::store(R[0] + at, p.R_i), I::store(R[1] + at, p.R_j), I::store(m[0] + at, p.m_i), I::store(m[1] + at, p.m_j);
+    }
+    if constexpr (scene.rolling == Rolling::relative) put<I>(w, at, p.w);
+  }
+  // Fields of the records of one side, in their order.
+  template <class I>
+  PLATEN_INLINE void take_fields(int at, int side, typename I::Real (&fields)[8]) const {
+    for (int axis = 0; axis < 3; ++axis) fields[axis] = I::load(F[axis] + at), fields[4 + axis] = I::load(T[side][axis] + at);
+    fields[3] = scene.rolling == Rolling::absolute ? I::load(S[side] + at) : I::set(0.0);
+    fields[7] = I::set(0.0);
+  }
+};
+
+// `width` pairs of a chunk, read when asked, and again when asked of another PairsOfChunk.
+//
+// A law needs some of a pair's numbers twice, at its start and at its end. Kept in between they find no register, and a
+// compiler saves them on the stack: a store of 64 bytes takes two cycles, a second load of what the chunk still holds half
+// a one. So the address goes through an empty statement that the compiler cannot look into.
+template <class I, SceneTraits scene>
+struct PairsOfChunk {
+  const double* at;
+  PLATEN_INLINE PairsOfChunk(const Chunk<scene>& chunk, int first) : at(chunk.delta + first) {}
+
+  using Real = typename I::Real;
+  using Columns = Chunk<scene>;
+  PLATEN_INLINE const double* column(std::size_t offset) const {
+    const double* p = at;
+    asm("" : "+r"(p));
+    return p + (offset - offsetof(Columns, delta)) / sizeof(double);
+  }
+  PLATEN_INLINE Real read(std::size_t offset) const { return I::load(column(offset)); }
+  PLATEN_INLINE Vec3<I> read3(std::size_t offset) const {
+    const double* p = column(offset);
+    return {I::load(p), I::load(p + chunk_size), I::load(p + 2 * chunk_size)};
+  }
+
+  PLATEN_INLINE Real delta() const { return read(offsetof(Columns, delta)); }
+  PLATEN_INLINE Vec3<I> n() const { return read3(offsetof(Columns, n)); }
+  PLATEN_INLINE Real v_n() const { return read(offsetof(Columns, v_n)); }
+  PLATEN_INLINE Vec3<I> v_t() const { return read3(offsetof(Columns, v_t)); }
+  PLATEN_INLINE Real lever(int side) const { return read(offsetof(Columns, lever) + of_side(side)); }
+  PLATEN_INLINE Real R(int side) const { return read(offsetof(Columns, R) + of_side(side)); }
+  PLATEN_INLINE Real m(int side) const { return read(offsetof(Columns, m) + of_side(side)); }
+  PLATEN_INLINE Vec3<I> w() const { return read3(offsetof(Columns, w)); }
+
+ private:
+  static constexpr std::size_t of_side(int side) { return static_cast<std::size_t>(side) * sizeof(typename Columns::Column); }
+};
+
+}  // namespace platen

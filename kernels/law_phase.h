@@ -1,0 +1,236 @@
+// Second phase of the contact kernel: forces and history of pairs, and what they take out of the ledger.
+#pragma once
+
+#include "kernels/chunk.h"
+#include "kernels/eepa.h"
+#include "kernels/rolling.h"
+#include "kernels/rounding.h"
+#include "kernels/twice.h"
+
+namespace platen {
+
+// What pairs take out of the ledger in a step [J]; order-free sums.
+template <class I>
+struct PairEnergies {
+  typename I::Real plastic, viscous, sliding, rolling, model;
+};
+
+// What a chunk shows of forces that are no forces. Tests of sums cost less than those of every contact; where a sum is
+// too large or not a number, `too_strong` looks at each.
+template <class I>
+struct Guards {
+  typename I::Real strength = I::set(0.0);        // sum of |Fx| + |Fy| + |Fz| + S, which is more than the root of |F|^2 + S^2 of any
+  typename I::Real lever_i = I::set(1.0), lever_j = I::set(1.0);  // the shortest
+};
+
+// Sums over the pairs of a chunk, on single vectors also where the law works on two at once.
+template <class I, bool guarded>
+struct ChunkSums {
+  using Sum = typename SingleOf<I>::Type;
+  PairEnergies<Sum> energy = {Sum::set(0.0), Sum::set(0.0), Sum::set(0.0), Sum::set(0.0), Sum::set(0.0)};
+  Guards<Sum> guards;
+  int contacts = 0;
+
+  PLATEN_INLINE void add(typename Sum::Real PairEnergies<Sum>::*term, const typename I::Real& value, const LawConstants& c) {
+    energy.*term = energy.*term + SingleOf<I>::sum(rounded<I>(value, c.energy));
+  }
+  PLATEN_INLINE void watch_force(const typename I::Real& size) {
+    if constexpr (guarded) guards.strength = guards.strength + SingleOf<I>::sum(size);
+  }
+  // Pairs that are apart have levers above 1, and padding, whose lever is no number, gives the second operand.
+  PLATEN_INLINE void watch_lever(const typename I::Real& lever, typename Sum::Real& shortest) {
+    if constexpr (guarded) shortest = SingleOf<I>::min(lever, shortest);
+  }
+};
+
+// Forces of `width` pairs from position `at` of a chunk on; reads and advances their history, adds their energies.
+// In an order that needs few numbers at a time: the tangential spring before its limit, the normal force and with it the
+// limit, the spring after it, dashpots, and what goes to each side.
+template <class I, SceneTraits scene, bool exact, bool guarded>
+PLATEN_INLINE void pair_forces(Chunk<scene>& chunk, int at, const PairBatch& b, const LawConstants& c, std::int32_t k,
+                               ChunkSums<I, guarded>& sums) {
+  using Real = typename I::Real;
+  using Energy = PairEnergies<typename SingleOf<I>::Type>;
+  const PairsOfChunk<I, scene> pairs(chunk, at);
+  const Real zero = I::set(0.0);
+  const Vec3<I> none = {zero, zero, zero};
+  const auto touching = pairs.delta() > zero;
+  sums.contacts += I::count(touching);
+  Real beta_n, k_t;
+  if constexpr (scene.exponent == Exponent::one && scene.equal_spheres) {
+    beta_n = I::set(c.beta_n);
+    k_t = I::set(c.k_t);
+  } else {
+    static_assert(!scene.equal_spheres, "other exponents are built for unequal spheres only");
+    const Real m_i = pairs.m(0), m_j = pairs.m(1), m = (m_i * m_j) / (m_i + m_j);
+    const Real K1 = loading_slope<I, scene.exponent>(I::where(touching, pairs.delta(), zero), c);
+    beta_n = I::sqrt(I::set(c.damping) * m * K1);
+    k_t = I::set(c.ratio) * K1;
+  }
+
+  const Vec3<I> T_old = {I::load(b.tx + k), I::load(b.ty + k), I::load(b.tz + k)};
+  const TrialSpring<I> trial = trial_spring<I, exact>(T_old, pairs.n(), pairs.v_t(), k_t, c.dt);
+
+  const Real s = overlap_power<I, scene.exponent>(I::where(touching, pairs.delta(), zero), c);
+  const Real sp_old = scene.plasticity ? I::load(b.sp + k) : zero;
+  const NormalResponse<I> normal = normal_response<I, scene>(s, sp_old, c);
+  if constexpr (scene.plasticity) {
+    I::store(b.sp + k, normal.sp);  // 0 when apart, since s = 0
+    if constexpr (scene.energy) sums.add(&Energy::plastic, plastic_dissipation<I, scene.exponent>(sp_old, normal.sp, c), c);
+  }
+  const Real f_n = normal.f_hys - beta_n * pairs.v_n();
+  const Real strength = I::abs(normal.f_hys);
+  Real S_i = zero;
+  if constexpr (scene.rolling == Rolling::absolute) {
+    S_i = I::where(touching, strength * pairs.lever(0), zero);
+    I::store(chunk.S[0] + at, S_i);
+    if constexpr (!scene.equal_spheres) I::store(chunk.S[1] + at, I::where(touching, strength * pairs.lever(1), zero));
+  }
+
+  const LimitedSpring<I> spring = limited_spring<I, exact>(trial, I::set(c.mu) * I::abs(normal.height));
+  const Vec3<I> T_new = where<I>(touching, spring.T, none);
+  I::store(b.tx + k, T_new.x), I::store(b.ty + k, T_new.y), I::store(b.tz + k, T_new.z);
+  if constexpr (scene.energy) {
+    if constexpr (scene.exponent == Exponent::one) {
+      sums.add(&Energy::sliding, I::where(touching, spring.loss, trial.was2) * I::set(c.half_over_k_t), c);
+    } else {
+      // The spring's energy |T|^2/(2 k_t) also changes with k_t(delta): that part is no work of any force [A17].
+      const Real k_t_last = I::load(b.k_t_last + k), half = I::set(0.5);
+      const Real flexible_last = I::where(k_t_last > zero, half / k_t_last, zero);
+      const Real flexible = I::where(touching, half / k_t, zero);
+      sums.add(&Energy::sliding, I::where(touching, spring.loss * flexible, trial.was2 * flexible_last), c);
+      sums.add(&Energy::model, I::where(touching, trial.was2 * (flexible - flexible_last), zero), c);
+      I::store(b.k_t_last + k, I::where(touching, k_t, zero));
+    }
+  }
+
+  const Real beta_t = beta_n * I::set(c.beta_ratio);
+  const Vec3<I> v_t = pairs.v_t();
+  const Vec3<I> F_t = sub_scaled<I>(spring.T, I::where(spring.cut, zero, beta_t), v_t);
+  if constexpr (scene.energy) {
+    // A dashpot's work in a step is c v(n-1/2) v(n) dt; v(n) is not known yet. Summed by parts that is, to second
+    // order, v(n-1/2)^2 (3/4 c(n) + 1/4 c(n-1)) dt: also in the step in which the spheres part [docs/laws.md, "Energy"].
+    const Real v_n = pairs.v_n();
+    const auto was_touching = I::fma(v_n, I::set(c.dt), pairs.delta()) > zero;
+    const Real now = I::set(0.75 * c.dt), before = I::set(0.25 * c.dt);
+    const Real normal_share = I::where(touching, now, zero) + I::where(was_touching, before, zero);
+    const Real tangential_share = I::where(spring.cut, zero, normal_share);
+    const Real viscous = (beta_n * normal_share) * (v_n * v_n) + (beta_t * tangential_share) * dot(v_t, v_t);
+    sums.add(&Energy::viscous, I::where(I::either(touching, was_touching), viscous, zero), c);
+  }
+
+  // Masked last: padding has no distance, and what it computes is not a number.
+  const Vec3<I> n = pairs.n();
+  const Vec3<I> F = where<I>(touching, add_scaled<I>(F_t, f_n, n), none);
+  chunk.template put<I>(chunk.F, at, F);
+  sums.watch_force((I::abs(F.x) + I::abs(F.y)) + (I::abs(F.z) + S_i));
+  const Vec3<I> turn = minus_cross(n, F_t);
+  const Real lever_i = pairs.lever(0);
+  sums.watch_lever(lever_i, sums.guards.lever_i);
+  Vec3<I> T_i = where<I>(touching, scale<I>(lever_i, turn), none);
+  if constexpr (!scene.equal_spheres) {
+    const Real lever_j = pairs.lever(1);
+    sums.watch_lever(lever_j, sums.guards.lever_j);
+    Vec3<I> T_j = where<I>(touching, scale<I>(lever_j, turn), none);
+    if constexpr (scene.rolling == Rolling::relative) {
+      const Real R_i = pairs.R(0), R_j = pairs.R(1);
+      const Real inertia_i = I::set(0.4) * pairs.m(0) * (R_i * R_i), inertia_j = I::set(0.4) * pairs.m(1) * (R_j * R_j);
+      const Vec3<I> torque = relative_rolling_torque<I, exact>(pairs.w(), I::set(c.mu_r) * strength, lever_i * R_i, lever_j * R_j,
+                                                               inertia_i, inertia_j, c.rolling_share, c.dt);
+      const Vec3<I> M = where<I>(touching, torque, none);
+      T_i = add_scaled<I>(T_i, I::set(1.0) / R_i, M);
+      T_j = add_scaled<I>(T_j, -(I::set(1.0) / R_j), M);
+      if constexpr (scene.energy) sums.add(&Energy::rolling, zero - dot(M, pairs.w()) * I::set(c.dt), c);
+    }
+    chunk.template put<I>(chunk.T[1], at, T_j);
+  }
+  chunk.template put<I>(chunk.T[0], at, T_i);
+}
+
+// Calls visit(term, value) for each energy that pairs of a scene have at all.
+template <class I, SceneTraits scene, class Visit>
+PLATEN_INLINE void for_each_energy(const PairEnergies<I>& energy, const Visit& visit) {
+  visit(term_viscous, energy.viscous);
+  visit(term_sliding, energy.sliding);
+  if constexpr (scene.plasticity) visit(term_plastic, energy.plastic);
+  if constexpr (scene.rolling == Rolling::relative) visit(term_rolling, energy.rolling);  // absolute: motion kernel
+  if constexpr (scene.exponent != Exponent::one) visit(term_model, energy.model);
+}
+
+// The vectors of a chunk in which something is to be found: where a pair touches, touched at the last step, or has a
+// history to forget. In a bed these are all, in a rain hardly any.
+struct ActiveVectors {
+  int at[chunk_size];
+  int count = 0;
+};
+template <class I, SceneTraits scene>
+PLATEN_INLINE ActiveVectors active_vectors(const Chunk<scene>& chunk, const PairBatch& b, double dt, std::int32_t start, int count) {
+  using Real = typename I::Real;
+  const Real zero = I::set(0.0);
+  ActiveVectors active;
+  for (int at = 0; at < count; at += I::width) {
+    const Real delta = I::load(chunk.delta + at), before = I::fma(I::load(chunk.v_n + at), I::set(dt), delta);
+    bool some = I::any(I::either(delta > zero, before > zero));
+    if (!some) {
+      const std::int32_t k = start + at;
+      Real size = (I::abs(I::load(b.tx + k)) + I::abs(I::load(b.ty + k))) + I::abs(I::load(b.tz + k));
+      if constexpr (scene.plasticity) size = size + I::abs(I::load(b.sp + k));
+      if constexpr (scene.exponent != Exponent::one) size = size + I::abs(I::load(b.k_t_last + k));
+      some = I::any(I::negate(zero >= size));
+    }
+    active.at[active.count] = at;
+    active.count += some;
+  }
+  return active;
+}
+
+// Whether a contact of the chunk is out of its bound [N]. Written so that a NaN counts as too strong.
+template <class I, SceneTraits scene>
+bool too_strong(const Chunk<scene>& chunk, const ActiveVectors& active, double bound) {
+  bool strong = false;
+  for (int m = 0; m < active.count; ++m) {
+    const Vec3<I> F = Chunk<scene>::template take<I>(chunk.F, active.at[m]);
+    typename I::Real strength2 = dot(F, F);
+    if constexpr (scene.rolling == Rolling::absolute) {
+      const typename I::Real S = I::load(chunk.S[0] + active.at[m]);
+      strength2 = I::fma(S, S, strength2);
+    }
+    strong = strong || I::any(I::negate(strength2 < I::set(bound * bound)));
+  }
+  return strong;
+}
+
+// Law of a chunk; whether every contribution is a number within its bound. (Only benches leave the guards out, to see
+// what they cost.)
+template <class I, SceneTraits scene, bool exact, bool guarded>
+PLATEN_INLINE bool law_of_chunk(Chunk<scene>& chunk, const PairBatch& b, const LawConstants& c, std::int32_t start,
+                                const ActiveVectors& active, PairTotals& totals) {
+  ChunkSums<I, guarded> sums;
+  for (int m = 0; m < active.count; ++m)
+    pair_forces<I, scene, exact, guarded>(chunk, active.at[m], b, c, start + active.at[m], sums);
+  using Sum = typename SingleOf<I>::Type;
+  bool fine = true;
+  if constexpr (guarded) {
+    // An overlap above R, the centre of one sphere deep inside the other, is no contact any more: a lever below R/2.
+    const Guards<Sum>& guards = sums.guards;
+    auto deep = guards.lever_i < Sum::set(0.5);
+    if constexpr (!scene.equal_spheres) deep = Sum::either(deep, guards.lever_j < Sum::set(0.5));
+    const auto strong = Sum::negate(guards.strength < Sum::set(c.force.bound));
+    if (Sum::any(Sum::either(deep, strong))) fine = !Sum::any(deep) && !too_strong<I, scene>(chunk, active, c.force.bound);
+  }
+  if constexpr (scene.energy) {
+    double size = 0.0;
+    for_each_energy<Sum, scene>(sums.energy, [&](int term, const typename Sum::Real& sum) {
+      const double total = Sum::sum(sum);
+      if constexpr (guarded) size += total < 0.0 ? -total : total;
+      totals.energy[term] += static_cast<std::int64_t>(total * c.energy.inverse);
+    });
+    // Beyond this bound sums are not exact. With forces within theirs a contact would have to move radii in one step, so
+    // that this is met by numbers that are none.
+    if constexpr (guarded) fine = fine && size < chunk_size / 2 * c.energy.bound;
+  }
+  totals.contacts += sums.contacts;
+  return fine;
+}
+
+}  // namespace platen
