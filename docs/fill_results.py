@@ -1,12 +1,15 @@
 #!/usr/bin/python3
 """Puts what a study found into docs/results.md.
 
-    /usr/bin/python3 docs/fill_results.py STUDY_FOLDER
+    /usr/bin/python3 docs/fill_results.py STUDY_FOLDER [STUDY_FOLDER ...]
 
-Between `<!-- KIND WHAT -->` and `<!-- end -->` everything is written anew; nothing else is touched. Kinds:
+Between `<!-- KIND WHAT -->` and `<!-- end -->` everything is written anew from the first of the folders that has it; what none of
+them has is left as it is. Kinds:
 
     figure N        the study's image, copied to docs/results/, and the statements on that figure
-    statements WHAT the statements of a figure column: filling, S2, checks, ...
+    image NAME      an image alone
+    statements WHAT the statements of a figure column: filling, S2, quasi-static, ...
+    scan POWER      the best of the tried powers and the minimum, by observable: stiffness, adhesion
     collapse        collapse errors of all curves
     runs            steps, time steps, ledger and wall time of every run, times of every seed
     total           how many statements hold
@@ -39,25 +42,43 @@ def shown(verdict):
 class Study:
     def __init__(self, folder):
         self.folder = folder
-        self.statements = table(folder / "statements.csv")
+        self.statements = table(folder / "statements.csv") if (folder / "statements.csv").exists() else []
+
+    def files(self, name):
+        return sorted(self.folder.glob(name)) + sorted(self.folder.glob("*/" + name))
 
     def said(self, what):
         rows = [s for s in self.statements if s["figure"] == what]
         if not rows:
-            return "No statement of this kind in the study."
+            return None
         return markdown(["statement", "number", "seeds", ""], [(s["statement"], s["number"], s["seeds"], shown(s["verdict"])) for s in rows])
 
-    def figure(self, number):
-        found = sorted(self.folder.glob(f"figures/fig{number}.svg")) + sorted(self.folder.glob(f"*/figures/fig{number}.svg"))
+    def image(self, name, alt=None):
+        found = self.files(f"figures/{name}.svg")
         if not found:
-            return f"Figure {number} is not in the study.\n\n" + self.said(number)
+            return None
         (DOCS / "results").mkdir(exist_ok=True)
         shutil.copyfile(found[0], DOCS / "results" / found[0].name)
-        return f"![Fig. {number}](results/{found[0].name})\n\n" + self.said(number)
+        return f"![{alt or name}](results/{found[0].name})"
+
+    def figure(self, number):
+        image, said = self.image("fig" + number, f"Fig. {number}"), self.said(number)
+        return f"{image}\n\n{said}" if image and said else None
+
+    def scan(self, power):
+        rows = []
+        for file in self.files("tables/scans.csv"):
+            for row in table(file):
+                if row["scanned power"] != power:
+                    continue
+                errors = ", ".join(f"{p}: {float(e):.3f}" for p, e in zip(row["powers"].split(), row["errors over range [-]"].split()))
+                minimum = f"{float(row['minimum']):.3f} ± {float(row['uncertainty']):.3f}" if row["minimum"] and row["uncertainty"] else row["minimum"] or "none"
+                rows.append((row["observable"], row["seeds"], errors, row["best tried"], minimum))
+        return markdown(["observable", "seeds", "error over range, by power", "best tried", "minimum"], rows) if rows else None
 
     def collapse(self):
         rows = []
-        for file in sorted(self.folder.glob("tables/collapse.csv")) + sorted(self.folder.glob("*/tables/collapse.csv")):
+        for file in self.files("tables/collapse.csv"):
             part = file.parent.parent.name if file.parent.parent != self.folder else "-"
             for row in table(file):
                 number = lambda key: f"{float(row[key]):.3g}" if row[key] else "-"
@@ -93,22 +114,26 @@ class Study:
         return f"{count('holds')} statements hold, {count('does not hold')} do not, {count('not judged')} cannot be judged from these runs."
 
     def block(self, kind, what):
-        if kind == "figure":
-            return self.figure(what)
-        if kind == "statements":
-            return self.said(what)
+        if what:
+            return {"figure": self.figure, "image": self.image, "statements": self.said, "scan": self.scan}[kind](what)
         return {"collapse": self.collapse, "runs": self.runs, "total": self.total}[kind]()
 
 
 def main():
-    if len(sys.argv) != 2 or not (Path(sys.argv[1]) / "statements.csv").exists():
+    folders = [Path(folder) for folder in sys.argv[1:]]
+    if not folders or not all((folder / "runs.csv").exists() for folder in folders):
         sys.exit(__doc__)
-    study = Study(Path(sys.argv[1]))
+    studies = [Study(folder) for folder in folders]
     page = DOCS / "results.md"
-    text = page.read_text(encoding="utf-8")
-    pattern = re.compile(r"(<!-- (figure|statements|collapse|runs|total) ?([^ ]*) -->\n).*?(<!-- end -->)", re.DOTALL)
-    text = pattern.sub(lambda m: m[1] + "\n" + study.block(m[2], m[3]) + "\n\n" + m[4], text)
-    page.write_text(text, encoding="utf-8")
+    pattern = re.compile(r"(<!-- (figure|image|statements|scan|collapse|runs|total) ?([^ ]*) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+    def filled(match):
+        for study in studies:
+            if block := study.block(match[2], match[3]):
+                return f"{match[1]}\n{block}\n\n{match[4]}"
+        return match[0]
+
+    page.write_text(pattern.sub(filled, page.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 if __name__ == "__main__":
