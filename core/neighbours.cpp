@@ -154,9 +154,33 @@ void colour(std::vector<Batch>& batches) {
 
 }  // namespace
 
-int automatic_batch(std::int32_t particles, int threads) {
-  // Three for each thread even the load out; a task is then long against what the graph takes for it.
-  return std::clamp(particles / (3 * std::max(1, threads)) / padding * padding, 256, 2048);
+int automatic_batch(std::int32_t particles, int threads, bool even) {
+  // Fewer and larger batches have fewer pairs across and cost the graph less. Where work lies unevenly, or the colours of
+  // many batches make it uneven, three to eight for each thread even the load out. The limit keeps the arrays of a batch
+  // on pages that the pool hands out again at the next rebuild.
+  const int largest = 20000, each = (particles + threads * largest - 1) / (threads * largest);
+  const int several = std::clamp(particles / 2048, 3 * threads, 8 * threads);
+  const int count = threads == 1 || (threads == 2 && even) ? threads * each : std::max(threads * each, several);
+  const int size = (particles + count - 1) / count;  // rounded up, or a last batch of a few spheres is left over
+  return std::max(256, (size + padding - 1) / padding * padding);
+}
+
+bool work_is_even(const std::vector<Batch>& batches, int parts) {
+  std::int64_t spheres = 0, work = 0;
+  for (const Batch& b : batches) spheres += b.count, work += b.count + b.used;  // a pair costs about as much as a sphere
+  if (spheres < parts) return false;
+  // Work of equal stretches of the curve, spread evenly within each batch.
+  double of_part = 0.0, most = 0.0;
+  std::int64_t at = 0, part = 1;
+  for (const Batch& b : batches) {
+    for (std::int64_t left = b.count; left > 0;) {
+      const std::int64_t end = spheres * part / parts, taken = std::min(left, end - at);
+      of_part += static_cast<double>(taken) * (1.0 + static_cast<double>(b.used) / static_cast<double>(b.count));
+      left -= taken, at += taken;
+      if (at == end) most = std::max(most, of_part), of_part = 0.0, ++part;
+    }
+  }
+  return most < 1.05 * static_cast<double>(work) / parts;
 }
 
 int BatchOf::operator()(std::int32_t particle) const {

@@ -46,7 +46,11 @@ std::vector<Batch> make_batches(const Particles& particles, const Domain& domain
                                 const ParallelFor& parallel);
 
 // Particles in a batch where nothing else is asked for: enough batches for all threads, none too small to be worth a task.
-int automatic_batch(std::int32_t particles, int threads);
+// `even`: equal stretches of the Morton curve are equal work.
+int automatic_batch(std::int32_t particles, int threads, bool even);
+
+// Whether `parts` equal stretches of the curve are, to 5 %, equal work. False where nothing is known yet.
+bool work_is_even(const std::vector<Batch>& batches, int parts);
 
 // Batch of a particle.
 struct BatchOf {

@@ -251,11 +251,12 @@ void Simulation::rebuild_with(const PairHistories& pairs) {
   if (had_forces) keep_sums(sums);
   const auto plates = plate_history(batches_, particles_);
   const auto run = [this](int count, const std::function<void(int)>& body) { parallel(count, body); };
+  const bool even = work_is_even(batches_, engine_.threads);
   particles_.permute(morton_order(particles_));
   choose_margins(true);
   graph_.reset();
   table_.reset();
-  const int size = engine_.batch > 0 ? engine_.batch : automatic_batch(particles_.count, engine_.threads);
+  const int size = engine_.batch > 0 ? engine_.batch : automatic_batch(particles_.count, engine_.threads, even);
   batches_ = make_batches(particles_, domain_, outer_, size, run);
   fill_inner(batches_, particles_, domain_, inner_, keeps_k_t(), pairs, run);
   list_plates(batches_, particles_, planes_, step_, inner_, plate_gap_, plates, run);

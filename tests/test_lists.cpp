@@ -165,4 +165,43 @@ TEST(Lists, PaddingDoesNotMove) {
 }
 
 }  // namespace
+
+// Batches of `spheres` each with the given numbers of pairs.
+std::vector<Batch> batches_with(std::int32_t spheres, std::initializer_list<std::int32_t> pairs) {
+  std::vector<Batch> batches;
+  for (const std::int32_t used : pairs) {
+    Batch& b = batches.emplace_back();
+    b.first = spheres * static_cast<std::int32_t>(batches.size() - 1), b.count = spheres, b.used = used;
+  }
+  return batches;
+}
+
+TEST(AutomaticBatch, OneForEachThreadWhereWorkIsEven) {
+  EXPECT_EQ(automatic_batch(5000, 1, false), 5000);
+  EXPECT_EQ(automatic_batch(5000, 2, true), 2504);   // whole vectors, and no third batch of a few spheres
+  EXPECT_EQ(automatic_batch(17213, 2, true), 8608);
+  EXPECT_EQ(automatic_batch(35000, 2, true), 17504);
+  EXPECT_EQ(automatic_batch(100, 1, false), 256);
+}
+
+TEST(AutomaticBatch, SeveralForEachThreadWhereItIsNot) {
+  EXPECT_EQ(automatic_batch(5000, 2, false), 840);
+  EXPECT_EQ(automatic_batch(35000, 2, false), 2192);
+  EXPECT_EQ(automatic_batch(35000, 4, true), 2064);
+}
+
+TEST(AutomaticBatch, NoneIsLargerThanThePoolHandsOut) {
+  for (const int threads : {1, 2, 4, 16})
+    for (const std::int32_t particles : {35'000, 280'000, 1'000'000, 5'000'000}) EXPECT_LE(automatic_batch(particles, threads, true), 20008);
+}
+
+TEST(AutomaticBatch, EvenWork) {
+  EXPECT_FALSE(work_is_even({}, 2));
+  EXPECT_TRUE(work_is_even(batches_with(1000, {3000, 3000, 3000}), 2));  // the middle batch counts half for each part
+  EXPECT_TRUE(work_is_even(batches_with(1000, {0, 6000, 0}), 2));
+  EXPECT_FALSE(work_is_even(batches_with(1000, {6000, 0, 0}), 2));       // a rain: all pairs at one end
+  EXPECT_FALSE(work_is_even(batches_with(1000, {3000, 3000, 2000, 2000}), 2));
+  EXPECT_TRUE(work_is_even(batches_with(1000, {6000, 0, 0}), 1));
+}
+
 }  // namespace platen
