@@ -71,7 +71,7 @@ class Study:
             for row in table(file):
                 if row["scanned power"] != power:
                     continue
-                errors = ", ".join(f"{p}: {float(e):.3f}" for p, e in zip(row["powers"].split(), row["errors over range [-]"].split()))
+                errors = ", ".join(f"{p}: {float(e):.3f}" for p, e in zip(row["powers"].split(";"), row["errors over range [-]"].split(";")))
                 minimum = f"{float(row['minimum']):.3f} ± {float(row['uncertainty']):.3f}" if row["minimum"] and row["uncertainty"] else row["minimum"] or "none"
                 rows.append((row["observable"], row["seeds"], errors, row["best tried"], minimum))
         return markdown(["observable", "seeds", "error over range, by power", "best tried", "minimum"], rows) if rows else None

@@ -155,7 +155,7 @@ int study_command(const StudyCommand& command) {
     for (const std::string& wrong : draw_figures(command.folder, plan, part)) spdlog::warn("{}", wrong);
   }
   write_statements(command.folder, statements);
-  write_study_h5(command.folder, plan, results);
+  write_study_h5(command.folder, plan, results, statements);
   if (!command.quiet) {
     const auto count = [&](std::optional<bool> holds) {
       return std::count_if(statements.begin(), statements.end(), [&](const Statement& s) { return s.holds == holds; });

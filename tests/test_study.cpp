@@ -308,6 +308,16 @@ TEST(Study, EndToEndAndKilledAtRandomPoints) {
   const Hdf5File h5 = Hdf5File::open(folder / "study.h5");
   const Hdf5Group curve = h5.root().group("part").group("curves").group("coarse a=1");
   EXPECT_EQ(curve.group("stress_strain").read<double>("x").size(), std::size_t(common_points));
+  const Hdf5Group of_scans = h5.root().group("part").group("scans");
+  ASSERT_EQ(of_scans.names().size(), 1u);
+  EXPECT_EQ(of_scans.group(of_scans.names().front()).read<double>("powers"), (std::vector<double>{0, 1, 2}));
+  const Hdf5Group judged = h5.root().group("statements");
+  const std::string lines = read_file(folder / "statements.csv");
+  EXPECT_EQ(static_cast<std::ptrdiff_t>(judged.names().size()) + 1, std::count(lines.begin(), lines.end(), '\n'));
+  for (const std::string& name : judged.names()) {
+    EXPECT_NE(lines.find(judged.group(name).text_attribute(".", "statement")), std::string::npos) << name;
+    EXPECT_NE(lines.find(judged.group(name).text_attribute(".", "verdict")), std::string::npos) << name;
+  }
 
   // The same again makes no run again.
   const auto before = fs::last_write_time(folder / "runs/tiny-R2.5mm-s1/summary.json");

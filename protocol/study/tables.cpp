@@ -186,6 +186,35 @@ void write_curve(Hdf5Group group, const MeasuredCurve& curve) {
   }
 }
 
+void write_scan_groups(Hdf5Group scans, const PartResults& part) {
+  for (const ScanResult& scan : part.scans) {
+    const std::string power = scan.power == ScanSpec::Power::stiffness ? "stiffness" : "adhesion";
+    const std::string name = group_name(fmt::format("{} R={} m, other power {}, {}", power, scan.radius, scan.other_power, scan.observable));
+    Hdf5Group group = scans.create_group(name);
+    group.attribute("power", power);
+    group.attribute("observable", scan.observable);
+    group.attribute("radius", scan.radius);
+    group.attribute("other_power", scan.other_power);
+    group.attribute("seeds", static_cast<std::int64_t>(scan.seeds));
+    group.attribute("best_tried", scan.best_tried);
+    group.write("powers", scan.powers, 1, {"-", "tried powers of R"});
+    group.write("errors", scan.errors, 1, {"-", "root mean square over seeds, over the reference's range"});
+    if (!scan.minimum) continue;
+    group.attribute("minimum", scan.minimum->power);
+    group.attribute("uncertainty", scan.minimum->uncertainty);
+    group.attribute("inside", scan.minimum->inside);
+  }
+}
+
+void write_statement(Hdf5Group group, const Statement& s) {
+  group.attribute("study", s.part);
+  group.attribute("figure", s.figure);
+  group.attribute("statement", s.text);
+  group.attribute("number", s.number);
+  group.attribute("seeds", static_cast<std::int64_t>(s.seeds));
+  group.attribute("verdict", verdict(s));
+}
+
 }  // namespace
 
 fs::path part_folder(const fs::path& folder, const StudyPlan& plan, const PlannedPart& part) {
@@ -230,7 +259,8 @@ void write_statements(const fs::path& folder, const std::vector<Statement>& stat
   write_whole_file(folder / "statements.csv", text);
 }
 
-void write_study_h5(const fs::path& folder, const StudyPlan& plan, const std::vector<PartResults>& results) {
+void write_study_h5(const fs::path& folder, const StudyPlan& plan, const std::vector<PartResults>& results,
+                    const std::vector<Statement>& statements) {
   Hdf5File file = Hdf5File::create(folder / "study.h5");
   {
     Hdf5Group root = file.root();
@@ -251,7 +281,10 @@ void write_study_h5(const fs::path& folder, const StudyPlan& plan, const std::ve
                        {observable_kind(row.observable).y_unit, "RMS distance of each seed from the mean of \"" +
                                                                     part.curves[row.reference].planned->label + "\""});
       }
+      if (!part.scans.empty()) write_scan_groups(group.create_group("scans"), part);
     }
+    Hdf5Group judged = root.create_group("statements");
+    for (std::size_t k = 0; k < statements.size(); ++k) write_statement(judged.create_group(fmt::format("{:04}", k)), statements[k]);
   }
   file.close();
 }

@@ -19,6 +19,6 @@ void write_run_table(const std::filesystem::path& folder, const StudyPlan& plan,
 void write_part_tables(const std::filesystem::path& folder, const StudyPlan& plan, const PartResults& part);
 void write_statements(const std::filesystem::path& folder, const std::vector<Statement>& statements);
 void write_study_h5(const std::filesystem::path& folder, const StudyPlan& plan,
-                    const std::vector<PartResults>& results);
+                    const std::vector<PartResults>& results, const std::vector<Statement>& statements);
 
 }  // namespace platen
