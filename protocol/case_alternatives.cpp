@@ -24,7 +24,7 @@ bool is_table(TableReader& table, std::string_view key) {
 }
 
 bool read_stiffness_alternative(TableReader& law, std::string_view key, const ParticleSpec& particles, double exponent,
-                                double& out) {
+                                double& out, std::string& formula) {
   TableReader data = law.table(key);
   double E = 0.0, nu = 0.0, V = 0.0, R = 0.0;
   bool good = data.quantity("young_modulus", Quantity::stress, positive, Need::required, E);
@@ -47,10 +47,13 @@ bool read_stiffness_alternative(TableReader& law, std::string_view key, const Pa
   out = impact  ? stiffness_of_impact(R, particles.density, E, nu, V)
         : plane ? stiffness_of_contact(R, E, nu)
                 : stiffness_of_modulus(R, E);
+  formula = impact  ? "16/15 sqrt(R*) E* (15 m* V^2 / (16 sqrt(R*) E*))^(1/5) [Thakur2016, Eq. 12, 13]"
+            : plane ? "2 E* R* [Thakur2016, Eq. 14]"
+                    : "pi R E / 2 [Thakur2016, Eq. 15]";
   return true;
 }
 
-bool read_f0_alternative(TableReader& law, std::string_view key, const ParticleSpec& particles, double& out) {
+bool read_f0_alternative(TableReader& law, std::string_view key, const ParticleSpec& particles, double& out, std::string& formula) {
   TableReader data = law.table(key);
   const std::array sources{"surface_energy", "hamaker_constant", "tensile_strength"};
   int given = 0;
@@ -74,17 +77,21 @@ bool read_f0_alternative(TableReader& law, std::string_view key, const ParticleS
     if (good)
       out = f0_of_surface_energy(
           R, gamma, std::array{AdhesionModel::dmt, AdhesionModel::jkr, AdhesionModel::plastic_jkr}[model], flattening);
+    formula = std::array{"-4 pi gamma R* [Thakur2016, Eq. 16]", "-3 pi gamma R* [Thakur2016, Eq. 17]",
+                         "-3 pi gamma R* flattening [Thakur2016, Eq. 18]"}[model];
   } else if (data.has("hamaker_constant")) {
     double A = 0.0, z0 = 0.0;
     good &= data.number("hamaker_constant", positive, Need::required, A, "the Hamaker constant is a plain number in J");
     good &= data.quantity("distance", Quantity::length, positive, Need::required, z0);
     if (good) out = f0_of_hamaker(R, A, z0);
+    formula = "-A R* / (6 z0^2) [Thakur2016, Eq. 19]";
   } else if (data.has("tensile_strength")) {
     double sigma_t = 0.0, phi = 0.0, CN = 0.0;
     good &= data.quantity("tensile_strength", Quantity::stress, positive, Need::required, sigma_t);
     good &= data.number("solid_fraction", fraction, Need::required, phi);
     good &= data.number("coordination_number", positive, Need::required, CN);
     if (good) out = f0_of_tensile_strength(R, sigma_t, phi, CN);
+    formula = "-4 pi R^2 sigma_t / (phi CN) [Thakur2016, Eq. 20, 21]";
   }
   data.refuse_unknown("f0 by material data");
   return good;

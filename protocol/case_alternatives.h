@@ -11,12 +11,12 @@ namespace platen {
 bool is_table(TableReader& table, std::string_view key);
 
 // { young_modulus }, { young_modulus, poisson_ratio } or { young_modulus, poisson_ratio, impact_speed }, for exponent 1 and spheres of one radius; the
-// latter needs the density. Returns true and sets `out` [N/m] where all is well; what is wrong goes to the problems.
+// latter needs the density. Returns true and sets `out` [N/m] and the formula where all is well; what is wrong goes to the problems.
 bool read_stiffness_alternative(TableReader& law, std::string_view key, const ParticleSpec& particles, double exponent,
-                                double& out);
+                                double& out, std::string& formula);
 
 // { surface_energy, model = "dmt" | "jkr" | "plastic_jkr", flattening }, { hamaker_constant, distance } or
 // { tensile_strength, solid_fraction, coordination_number }. As above; f0 <= 0 [N].
-bool read_f0_alternative(TableReader& law, std::string_view key, const ParticleSpec& particles, double& out);
+bool read_f0_alternative(TableReader& law, std::string_view key, const ParticleSpec& particles, double& out, std::string& formula);
 
 }  // namespace platen

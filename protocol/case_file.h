@@ -6,6 +6,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "kernels/law_parameters.h"
@@ -45,6 +46,7 @@ struct ParticleSpec {
   std::string file;                  // as written in the case; empty: particles are made by `fill`
   std::optional<ParticleTable> table;  // contents of `file`
   PairLaw law;
+  std::vector<std::pair<std::string, std::string>> law_origins;  // key and formula of what material data gave
 };
 
 struct PlateSpec {

@@ -59,11 +59,17 @@ bool read_sizes(TableReader& sizes, SizeDistribution& out) {
   return good;
 }
 
-void read_law(TableReader& law, const ParticleSpec& particles, PairLaw& out) {
+void read_law(TableReader& law, ParticleSpec& particles) {
+  PairLaw& out = particles.law;
   // With another exponent the stiffnesses are N/m^n, for which there are no unit names. A bad exponent stays 1 here.
   law.number("exponent", positive, Need::optional, out.exponent);
   const auto stiffness = [&](const char* key, Range range, Need need, double& value) {
-    if (is_table(law, key)) return read_stiffness_alternative(law, key, particles, out.exponent, value);
+    if (is_table(law, key)) {
+      std::string formula;
+      const bool good = read_stiffness_alternative(law, key, particles, out.exponent, value, formula);
+      if (good) particles.law_origins.emplace_back(key, formula);
+      return good;
+    }
     if (out.exponent == 1.0) return law.quantity(key, Quantity::stiffness, range, need, value);
     return law.number(key, range, need, value,
                       "with an exponent other than 1 stiffnesses are in N/m^n and take no unit");
@@ -74,8 +80,12 @@ void read_law(TableReader& law, const ParticleSpec& particles, PairLaw& out) {
   if (k1 && k2 && out.k2 < out.k1) {
     law.error("k2", fmt::format("{:g} is smaller than k1 = {:g}; allowed: k2 >= k1", out.k2, out.k1));
   }
-  if (is_table(law, "f0")) read_f0_alternative(law, "f0", particles, out.f0);
-  else law.quantity("f0", Quantity::force, not_positive, Need::optional, out.f0);
+  if (is_table(law, "f0")) {
+    std::string formula;
+    if (read_f0_alternative(law, "f0", particles, out.f0, formula)) particles.law_origins.emplace_back("f0", formula);
+  } else {
+    law.quantity("f0", Quantity::force, not_positive, Need::optional, out.f0);
+  }
   law.number("tangential_ratio", not_negative, Need::optional, out.tangential_ratio);
   law.number("restitution", proper_part, Need::optional, out.restitution);
   out.friction = 0.5;
@@ -131,7 +141,7 @@ void read_particles(TableReader& particles, ParticleSpec& out, CaseFacts& facts)
   particles.quantity("density", Quantity::density, positive, need, out.density);
   particles.integer("count", 1, 1'000'000'000, need, out.count);
   TableReader law = particles.table("law", Need::required);
-  read_law(law, out, out.law);
+  read_law(law, out);
   particles.refuse_unknown("particles");
 }
 

@@ -196,6 +196,7 @@ std::string check_text(const Case& c, const CheckReport& r) {
   const PairLaw& law = c.particles.law;
   const std::string unit = law.exponent == 1.0 ? "N/m" : fmt::format("N/m^{:g}", law.exponent);
   row("law", fmt::format("k1 {:.5g}, k2 {:.5g}, k_adh {:.5g}, k_t {:.5g} {}, f0 {:.4g} N", law.k1, law.k2, law.k_adh, law.tangential_ratio * law.k1, unit, law.f0));
+  for (const auto& [key, formula] : c.particles.law_origins) text += fmt::format("{:<16}{} = {}\n", "", key, formula);
   if (r.bond_number) row("Bond number", fmt::format("{:.3g}  (|f0| over a sphere's weight)", *r.bond_number));
   for (const InertialNumber& i : r.inertial)
     row("inertial number", fmt::format("{:.1e}  {} at {:.3g} kPa ({})", i.value, i.stage, 1e-3 * i.stress, i.of));
@@ -222,6 +223,7 @@ std::string check_json(const Case& c, const CheckReport& r) {
   if (r.settled_height) json["settled_bed"] = {{"height", *r.settled_height}, {"porosity", *r.settled_porosity}};
   const PairLaw& law = c.particles.law;
   json["law"] = {{"k1", law.k1}, {"k2", law.k2}, {"k_adh", law.k_adh}, {"k_t", law.tangential_ratio * law.k1}, {"f0", law.f0}, {"exponent", law.exponent}};
+  for (const auto& [key, formula] : c.particles.law_origins) json["law"]["from"][key] = formula;
   if (r.bond_number) json["bond_number"] = *r.bond_number;
   json["inertial_numbers"] = Json::array();
   for (const InertialNumber& i : r.inertial)

@@ -54,6 +54,19 @@ TEST(CheckCommand, DimensionlessNumbers) {
   EXPECT_FALSE(check_report(good({"environment.gravity=0", "stage.fill.method=grow", "stage.fill.porosity=0.5"}), 1).bond_number);
 }
 
+TEST(CheckCommand, FormulasOfMaterialData) {
+  const Case c = good({"particles.law.k1={ young_modulus = \"1 MPa\", poisson_ratio = 0.3 }", "particles.law.f0={ surface_energy = \"0.05 J/m2\", model = \"jkr\" }"});
+  const CheckReport r = check_report(c, 1);
+  const std::string text = check_text(c, r);
+  EXPECT_NE(text.find("k1 = 2 E* R* [Thakur2016, Eq. 14]\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("f0 = -3 pi gamma R* [Thakur2016, Eq. 17]\n"), std::string::npos) << text;
+  EXPECT_EQ(text.find("k2 = "), std::string::npos) << "a plain number";
+  const auto json = nlohmann::json::parse(check_json(c, r));
+  EXPECT_EQ(json.at("law").at("from").size(), 2u);
+  EXPECT_EQ(json.at("law").at("from").at("k1"), "2 E* R* [Thakur2016, Eq. 14]");
+  EXPECT_FALSE(nlohmann::json::parse(check_json(good(), check_report(good(), 1))).at("law").contains("from"));
+}
+
 TEST(CheckCommand, TimeStep) {
   const CheckReport r = check_report(good(), 1);
   // dt_crit of a dense bed: 0.75 sqrt(m/k2) at k2 = 5 k1.
