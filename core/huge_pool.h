@@ -1,6 +1,6 @@
 // Memory on huge pages for arrays that are too small to have a page of their own.
 //
-// A bed has hundreds of lists of some ten kilobytes each. On pages of 4 KiB they take more of them than a processor
+// A bed has dozens to hundreds of lists of ten kilobytes to a megabyte each. On pages of 4 KiB they take more of them than a processor
 // keeps translations for, and every pass over the bed pays for looking them up again, twice over in a virtual machine.
 #pragma once
 

@@ -156,9 +156,11 @@ void colour(std::vector<Batch>& batches) {
 
 int automatic_batch(std::int32_t particles, int threads, bool even) {
   // Fewer and larger batches have fewer pairs across and cost the graph less. Where work lies unevenly, or the colours of
-  // many batches make it uneven, three to eight for each thread even the load out. The limit keeps the arrays of a batch
-  // on pages that the pool hands out again at the next rebuild.
-  const int largest = 20000, each = (particles + threads * largest - 1) / (threads * largest);
+  // many batches make it uneven, about three to eight for each thread even the load out, eight from 2,048 spheres each on,
+  // where a task is long against what the graph takes for it. None has more than 20,000: its sums, 64 bytes a sphere and
+  // those of its halo, then stay below the 2 MiB up to which the pool hands arrays out again at the next rebuild.
+  threads = std::max(1, threads);
+  const int largest = 20000, each = std::max(1, (particles + threads * largest - 1) / (threads * largest));
   const int several = std::clamp(particles / 2048, 3 * threads, 8 * threads);
   const int count = threads == 1 || (threads == 2 && even) ? threads * each : std::max(threads * each, several);
   const int size = (particles + count - 1) / count;  // rounded up, or a last batch of a few spheres is left over
@@ -168,7 +170,7 @@ int automatic_batch(std::int32_t particles, int threads, bool even) {
 bool work_is_even(const std::vector<Batch>& batches, int parts) {
   std::int64_t spheres = 0, work = 0;
   for (const Batch& b : batches) spheres += b.count, work += b.count + b.used;  // a pair costs about as much as a sphere
-  if (spheres < parts) return false;
+  if (parts < 1 || spheres < parts) return false;
   // Work of equal stretches of the curve, spread evenly within each batch.
   double of_part = 0.0, most = 0.0;
   std::int64_t at = 0, part = 1;

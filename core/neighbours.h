@@ -46,7 +46,7 @@ std::vector<Batch> make_batches(const Particles& particles, const Domain& domain
                                 const ParallelFor& parallel);
 
 // Particles in a batch where nothing else is asked for: enough batches for all threads, none too small to be worth a task.
-// `even`: equal stretches of the Morton curve are equal work.
+// `even`: equal stretches of the Morton curve are equal work; of interest to two threads only.
 int automatic_batch(std::int32_t particles, int threads, bool even);
 
 // Whether `parts` equal stretches of the curve are, to 5 %, equal work. False where nothing is known yet.

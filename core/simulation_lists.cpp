@@ -251,7 +251,7 @@ void Simulation::rebuild_with(const PairHistories& pairs) {
   if (had_forces) keep_sums(sums);
   const auto plates = plate_history(batches_, particles_);
   const auto run = [this](int count, const std::function<void(int)>& body) { parallel(count, body); };
-  const bool even = work_is_even(batches_, engine_.threads);
+  const bool even = engine_.threads == 2 && work_is_even(batches_, engine_.threads);
   particles_.permute(morton_order(particles_));
   choose_margins(true);
   graph_.reset();
@@ -262,7 +262,7 @@ void Simulation::rebuild_with(const PairHistories& pairs) {
   list_plates(batches_, particles_, planes_, step_, inner_, plate_gap_, plates, run);
   merged_.assign(batches_.size(), 1);
   if (had_forces) put_sums(sums);
-  // The graph is as long as a usual run between two looks; a thousand batches need no long graphs to keep cores busy.
+  // The graph is as long as a usual run between two looks.
   unroll_ = engine_.unroll;
   prepare_graph();
   remember(at_rebuild_, drift_at_rebuild_);

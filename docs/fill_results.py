@@ -62,8 +62,9 @@ class Study:
         return f"![{alt or name}](results/{found[0].name})"
 
     def figure(self, number):
-        image, said = self.image("fig" + number, f"Fig. {number}"), self.said(number)
-        return f"{image}\n\n{said}" if image and said else None
+        said = self.said(number)
+        image = self.image("fig" + number, f"Fig. {number}") if said else None
+        return f"{image}\n\n{said}" if image else None
 
     def scan(self, power):
         rows = []
@@ -73,8 +74,9 @@ class Study:
                     continue
                 errors = ", ".join(f"{p}: {float(e):.3f}" for p, e in zip(row["powers"].split(";"), row["errors over range [-]"].split(";")))
                 minimum = f"{float(row['minimum']):.3f} ± {float(row['uncertainty']):.3f}" if row["minimum"] and row["uncertainty"] else row["minimum"] or "none"
-                rows.append((row["observable"], row["seeds"], errors, row["best tried"], minimum))
-        return markdown(["observable", "seeds", "error over range, by power", "best tried", "minimum"], rows) if rows else None
+                where = f"{1e3 * float(row['radius [m]']):g} mm, other power {float(row['other power [-]']):g}"
+                rows.append((where, row["observable"], row["seeds"], errors, row["best tried"], minimum))
+        return markdown(["curve", "observable", "seeds", "error over range, by power", "best tried", "minimum"], rows) if rows else None
 
     def collapse(self):
         rows = []
@@ -84,6 +86,8 @@ class Study:
                 number = lambda key: f"{float(row[key]):.3g}" if row[key] else "-"
                 rows.append((part, row["curve"], row["observable"], row["seeds"], number("error"), number("scatter"),
                              number("over range [-]"), number("over seed scatter [-]")))
+        if not rows:
+            return None
         return markdown(["study", "curve", "observable", "seeds", "error", "scatter", "over range", "over seed scatter"], rows)
 
     def runs(self):
@@ -110,6 +114,8 @@ class Study:
         return markdown(header, rows) + "\n\n" + markdown(["seed", "runs", "h of one thread", "min from the first start to the last end"], seeds)
 
     def total(self):
+        if not self.statements:
+            return None
         count = lambda verdict: sum(s["verdict"] == verdict for s in self.statements)
         return f"{count('holds')} statements hold, {count('does not hold')} do not, {count('not judged')} cannot be judged from these runs."
 
@@ -131,6 +137,7 @@ def main():
         for study in studies:
             if block := study.block(match[2], match[3]):
                 return f"{match[1]}\n{block}\n\n{match[4]}"
+        print(f"left as it is: {match[1].strip()}")
         return match[0]
 
     page.write_text(pattern.sub(filled, page.read_text(encoding="utf-8")), encoding="utf-8")

@@ -66,40 +66,43 @@ struct Chunk {
   }
 };
 
-// `width` pairs of a chunk, read when asked, and again when asked of another PairsOfChunk.
+// `width` pairs of a chunk from one position on, read at each call.
 //
 // A law needs some of a pair's numbers twice, at its start and at its end. Kept in between they find no register, and a
-// compiler saves them on the stack: a store of 64 bytes takes two cycles, a second load of what the chunk still holds half
-// a one. So the address goes through an empty statement that the compiler cannot look into.
+// compiler saves them on the stack, which costs a store (of 64 bytes two cycles on Zen 4) where reading again what the
+// chunk still holds costs a load. So the address goes through an empty statement that a compiler cannot look into. It may
+// still join two reads with no store between them that could change the chunk; here there are such stores.
 template <class I, SceneTraits scene>
-struct PairsOfChunk {
-  const double* at;
-  PLATEN_INLINE PairsOfChunk(const Chunk<scene>& chunk, int first) : at(chunk.delta + first) {}
+class PairsOfChunk {
+ public:
+  PLATEN_INLINE PairsOfChunk(const Chunk<scene>& chunk, int first)
+      : place_(reinterpret_cast<const char*>(&chunk) + static_cast<std::size_t>(first) * sizeof(double)) {}
 
   using Real = typename I::Real;
-  using Columns = Chunk<scene>;
-  PLATEN_INLINE const double* column(std::size_t offset) const {
-    const double* p = at;
-    asm("" : "+r"(p));
-    return p + (offset - offsetof(Columns, delta)) / sizeof(double);
-  }
-  PLATEN_INLINE Real read(std::size_t offset) const { return I::load(column(offset)); }
-  PLATEN_INLINE Vec3<I> read3(std::size_t offset) const {
-    const double* p = column(offset);
-    return {I::load(p), I::load(p + chunk_size), I::load(p + 2 * chunk_size)};
-  }
-
   PLATEN_INLINE Real delta() const { return read(offsetof(Columns, delta)); }
   PLATEN_INLINE Vec3<I> n() const { return read3(offsetof(Columns, n)); }
   PLATEN_INLINE Real v_n() const { return read(offsetof(Columns, v_n)); }
   PLATEN_INLINE Vec3<I> v_t() const { return read3(offsetof(Columns, v_t)); }
-  PLATEN_INLINE Real lever(int side) const { return read(offsetof(Columns, lever) + of_side(side)); }
-  PLATEN_INLINE Real R(int side) const { return read(offsetof(Columns, R) + of_side(side)); }
-  PLATEN_INLINE Real m(int side) const { return read(offsetof(Columns, m) + of_side(side)); }
+  PLATEN_INLINE Real lever(int side) const { return read(offsetof(Columns, lever) + side * column); }
+  PLATEN_INLINE Real R(int side) const { return read(offsetof(Columns, R) + side * column); }
+  PLATEN_INLINE Real m(int side) const { return read(offsetof(Columns, m) + side * column); }
   PLATEN_INLINE Vec3<I> w() const { return read3(offsetof(Columns, w)); }
 
  private:
-  static constexpr std::size_t of_side(int side) { return static_cast<std::size_t>(side) * sizeof(typename Columns::Column); }
+  using Columns = Chunk<scene>;
+  static constexpr std::size_t column = sizeof(typename Columns::Column);
+  PLATEN_INLINE const double* at(std::size_t offset) const {
+    const char* p = place_;
+    asm("" : "+r"(p));
+    return reinterpret_cast<const double*>(p + offset);
+  }
+  PLATEN_INLINE Real read(std::size_t offset) const { return I::load(at(offset)); }
+  PLATEN_INLINE Vec3<I> read3(std::size_t offset) const {
+    const double* p = at(offset);
+    return {I::load(p), I::load(p + chunk_size), I::load(p + 2 * chunk_size)};
+  }
+
+  const char* place_;  // of these pairs in the first column; in the others they are as many bytes behind as columns are apart
 };
 
 }  // namespace platen

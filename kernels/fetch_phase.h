@@ -5,8 +5,6 @@
 
 namespace platen {
 
-// The owner side. Consecutive contacts share owners, and owners follow each other along the curve: eight contacts mostly have theirs
-// within eight places, which one load and one permutation per field bring.
 template <class I>
 struct Fetched {
   typename I::Real row[12];
@@ -17,6 +15,8 @@ PLATEN_INLINE Fetched<I> fetch_rows(const double* rows, const std::int32_t* inde
   I::fetch_rows(rows, index, f.row);
   return f;
 }
+// The owner side. Consecutive contacts share owners, and owners follow each other along the curve: eight contacts mostly
+// have theirs within eight places, which one load and one permutation per field bring.
 template <class I, SceneTraits scene>
 PLATEN_INLINE Fetched<I> fetch_owners(const PairBatch& b, std::int32_t k) {
   if constexpr (requires { typename I::Half; }) {

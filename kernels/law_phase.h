@@ -38,7 +38,8 @@ struct ChunkSums {
     if constexpr (guarded) guards.strength = guards.strength + SingleOf<I>::sum(size);
   }
   // Pairs that are apart have levers above 1, and padding, whose lever is no number, gives the second operand.
-  PLATEN_INLINE void watch_lever(const typename I::Real& lever, typename Sum::Real& shortest) {
+  PLATEN_INLINE void watch_lever(int side, const typename I::Real& lever) {
+    typename Sum::Real& shortest = side == 0 ? guards.lever_i : guards.lever_j;
     if constexpr (guarded) shortest = SingleOf<I>::min(lever, shortest);
   }
 };
@@ -49,6 +50,7 @@ struct ChunkSums {
 template <class I, SceneTraits scene, bool exact, bool guarded>
 PLATEN_INLINE void pair_forces(Chunk<scene>& chunk, int at, const PairBatch& b, const LawConstants& c, std::int32_t k,
                                ChunkSums<I, guarded>& sums) {
+  static_assert(scene.rolling != Rolling::relative || !scene.equal_spheres, "relative rolling is built for unequal spheres only");
   using Real = typename I::Real;
   using Energy = PairEnergies<typename SingleOf<I>::Type>;
   const PairsOfChunk<I, scene> pairs(chunk, at);
@@ -68,9 +70,11 @@ PLATEN_INLINE void pair_forces(Chunk<scene>& chunk, int at, const PairBatch& b, 
     k_t = I::set(c.ratio) * K1;
   }
 
+  // spring before its limit [Eq. 5]
   const Vec3<I> T_old = {I::load(b.tx + k), I::load(b.ty + k), I::load(b.tz + k)};
   const TrialSpring<I> trial = trial_spring<I, exact>(T_old, pairs.n(), pairs.v_t(), k_t, c.dt);
 
+  // f_hys [Eq. 2], F_n [Eq. 1, 3, 4]
   const Real s = overlap_power<I, scene.exponent>(I::where(touching, pairs.delta(), zero), c);
   const Real sp_old = scene.plasticity ? I::load(b.sp + k) : zero;
   const NormalResponse<I> normal = normal_response<I, scene>(s, sp_old, c);
@@ -87,6 +91,7 @@ PLATEN_INLINE void pair_forces(Chunk<scene>& chunk, int at, const PairBatch& b, 
     if constexpr (!scene.equal_spheres) I::store(chunk.S[1] + at, I::where(touching, strength * pairs.lever(1), zero));
   }
 
+  // limit [Eq. 9, 10, A11]
   const LimitedSpring<I> spring = limited_spring<I, exact>(trial, I::set(c.mu) * I::abs(normal.height));
   const Vec3<I> T_new = where<I>(touching, spring.T, none);
   I::store(b.tx + k, T_new.x), I::store(b.ty + k, T_new.y), I::store(b.tz + k, T_new.z);
@@ -104,6 +109,7 @@ PLATEN_INLINE void pair_forces(Chunk<scene>& chunk, int at, const PairBatch& b, 
     }
   }
 
+  // F_t [Eq. 6, 7, A10]
   const Real beta_t = beta_n * I::set(c.beta_ratio);
   const Vec3<I> v_t = pairs.v_t();
   const Vec3<I> F_t = sub_scaled<I>(spring.T, I::where(spring.cut, zero, beta_t), v_t);
@@ -119,6 +125,7 @@ PLATEN_INLINE void pair_forces(Chunk<scene>& chunk, int at, const PairBatch& b, 
     sums.add(&Energy::viscous, I::where(I::either(touching, was_touching), viscous, zero), c);
   }
 
+  // to each side: F, T = lever n x F_t; rolling [Eq. 11, A12-A14]
   // Masked last: padding has no distance, and what it computes is not a number.
   const Vec3<I> n = pairs.n();
   const Vec3<I> F = where<I>(touching, add_scaled<I>(F_t, f_n, n), none);
@@ -126,11 +133,11 @@ PLATEN_INLINE void pair_forces(Chunk<scene>& chunk, int at, const PairBatch& b, 
   sums.watch_force((I::abs(F.x) + I::abs(F.y)) + (I::abs(F.z) + S_i));
   const Vec3<I> turn = minus_cross(n, F_t);
   const Real lever_i = pairs.lever(0);
-  sums.watch_lever(lever_i, sums.guards.lever_i);
+  sums.watch_lever(0, lever_i);
   Vec3<I> T_i = where<I>(touching, scale<I>(lever_i, turn), none);
   if constexpr (!scene.equal_spheres) {
     const Real lever_j = pairs.lever(1);
-    sums.watch_lever(lever_j, sums.guards.lever_j);
+    sums.watch_lever(1, lever_j);
     Vec3<I> T_j = where<I>(touching, scale<I>(lever_j, turn), none);
     if constexpr (scene.rolling == Rolling::relative) {
       const Real R_i = pairs.R(0), R_j = pairs.R(1);

@@ -57,7 +57,7 @@ void plate_kernel(const PlateBatch& b, const Plane& plane, const PlateConstants&
       I::store_record(b.records + record_size * static_cast<std::int64_t>(k + lane), records[lane]);
 
     const Real half = I::set(0.5), old2 = dot(xi_old, xi_old);
-    // As in contact_kernel.h: v(n-1/2)^2 (3/4 c(n) + 1/4 c(n-1)) dt, c^2 = damping m S.
+    // As in law_phase.h: v(n-1/2)^2 (3/4 c(n) + 1/4 c(n-1)) dt, c^2 = damping m S.
     const Real c_t_last = I::sqrt((I::set(c.damping) * m) * S_last);
     const Real c_n_last = c_t_last * I::set(c.normal_to_tangential);
     const Real now = I::set(0.75 * c.dt), before = I::set(0.25 * c.dt);

@@ -94,7 +94,9 @@ template <class I>
 struct SingleOf<Twice<I>> {
   using Type = I;
   static PLATEN_INLINE typename I::Real sum(const typename Twice<I>::Real& x) { return x.a + x.b; }
-  static PLATEN_INLINE typename I::Real min(const typename Twice<I>::Real& x, const typename I::Real& y) { return I::min(x.a, I::min(x.b, y)); }
+  static PLATEN_INLINE typename I::Real min(const typename Twice<I>::Real& x, const typename I::Real& y) {
+    return I::min(x.a, I::min(x.b, y));
+  }
 };
 
 // What the law runs on. AVX2 has too few registers for two vectors at once [docs/decisions.md].

@@ -9,7 +9,7 @@
 #include <cstring>
 #include <limits>
 
-#include "kernels/real.h"
+#include "kernels/twice.h"
 
 namespace platen {
 
@@ -67,6 +67,26 @@ class RealChecks {
     double v[W];
     I::store(v, got);
     for (int lane = 0; lane < W; ++lane) same(what, v[lane], want(lane));
+  }
+
+  // Sums and the least of two vectors side by side, a number that is none in either, both or neither.
+  void folded() {
+    using Two = Twice<I>;
+    double nan_in[2 * W], so_far[W];
+    for (int which = 0; which < 4; ++which) {
+      for (int lane = 0; lane < 2 * W; ++lane) {
+        const bool missing = lane < W ? which & 1 : which & 2;
+        nan_in[lane] = missing ? std::numeric_limits<double>::quiet_NaN() : 0.25 * (lane + 1);
+      }
+      for (int lane = 0; lane < W; ++lane) so_far[lane] = 0.3 * (lane + 1);
+      const auto wanted = [&](int lane) {
+        double least = so_far[lane];
+        for (const double x : {nan_in[lane], nan_in[lane + W]}) least = x < least ? x : least;
+        return least;
+      };
+      each("least of two", SingleOf<Two>::min(Two::load(nan_in), I::load(so_far)), wanted);
+      each("sum of two", SingleOf<Two>::sum(Two::load(nan_in)), [&](int lane) { return nan_in[lane] + nan_in[lane + W]; });
+    }
   }
 
   void arithmetic() {
@@ -211,6 +231,7 @@ class RealChecks {
   explicit RealChecks(RealReport& report) : report_(report) {}
   void all() {
     arithmetic();
+    folded();
     one_argument();
     across_lanes();
     rows_and_records();

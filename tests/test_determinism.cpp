@@ -98,6 +98,18 @@ TEST(Determinism, BatchSizes) {
     }
 }
 
+TEST(Determinism, AutomaticBatches) {
+  for (const int threads : {1, 2, 3}) {
+    EngineOptions engine;
+    engine.threads = threads;
+    const Outcome r = run(pressed_bed(engine), bed_steps);
+    expect_same(r, reference(), std::to_string(threads) + " threads");
+    // 990 spheres: one batch on one thread; two on two where work is even, else as many as 256 spheres each leave.
+    if (threads == 1) EXPECT_EQ(r.counters.batches, 1);
+    else EXPECT_TRUE(r.counters.batches == 4 || (threads == 2 && r.counters.batches == 2)) << r.counters.batches;
+  }
+}
+
 TEST(Determinism, SkinsAndGaps) {
   const double R = 0.0025;
   for (const double skin : {0.1 * R, 0.3 * R, 0.7 * R})

@@ -164,8 +164,6 @@ TEST(Lists, PaddingDoesNotMove) {
   EXPECT_LE(sim.counters().redone_steps, 32);  // the first steps, before the common velocity is known
 }
 
-}  // namespace
-
 // Batches of `spheres` each with the given numbers of pairs.
 std::vector<Batch> batches_with(std::int32_t spheres, std::initializer_list<std::int32_t> pairs) {
   std::vector<Batch> batches;
@@ -182,6 +180,7 @@ TEST(AutomaticBatch, OneForEachThreadWhereWorkIsEven) {
   EXPECT_EQ(automatic_batch(17213, 2, true), 8608);
   EXPECT_EQ(automatic_batch(35000, 2, true), 17504);
   EXPECT_EQ(automatic_batch(100, 1, false), 256);
+  for (const int threads : {0, 1, 2, 3}) EXPECT_EQ(automatic_batch(0, threads, true), 256);
 }
 
 TEST(AutomaticBatch, SeveralForEachThreadWhereItIsNot) {
@@ -197,6 +196,7 @@ TEST(AutomaticBatch, NoneIsLargerThanThePoolHandsOut) {
 
 TEST(AutomaticBatch, EvenWork) {
   EXPECT_FALSE(work_is_even({}, 2));
+  EXPECT_FALSE(work_is_even(batches_with(1000, {3000}), 0));
   EXPECT_TRUE(work_is_even(batches_with(1000, {3000, 3000, 3000}), 2));  // the middle batch counts half for each part
   EXPECT_TRUE(work_is_even(batches_with(1000, {0, 6000, 0}), 2));
   EXPECT_FALSE(work_is_even(batches_with(1000, {6000, 0, 0}), 2));       // a rain: all pairs at one end
@@ -204,4 +204,5 @@ TEST(AutomaticBatch, EvenWork) {
   EXPECT_TRUE(work_is_even(batches_with(1000, {6000, 0, 0}), 1));
 }
 
+}  // namespace
 }  // namespace platen

@@ -96,6 +96,8 @@ class Scanner {
         one.power = spec_.power;
         one.radius = std::get<0>(group);
         one.other_power = std::get<1>(group);
+        one.varied = std::get<2>(group);
+        one.reference = part_.curves[std::get<3>(group)].planned->label;
         one.observable = which.size() > 1 ? "all" : data.observables[which.front()].name;
         one.powers = data.powers;
         one.seeds = static_cast<int>(data.observables[which.front()].of_power.front().size());

@@ -39,6 +39,8 @@ struct ScanResult {
   std::string observable;                 // "all": root of the mean of the squared relative errors of all observables
   double radius = 0.0;                    // [m]
   double other_power = 0.0;               // the one that is not scanned
+  std::map<std::string, std::string> varied;  // of its curves: key -> TOML value
+  std::string reference;                  // label of the curve it is judged against
   std::vector<double> powers;             // increasing
   std::vector<double> errors;             // root mean square over seeds, relative to the reference's range
   int seeds = 0;

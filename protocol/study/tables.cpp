@@ -187,11 +187,12 @@ void write_curve(Hdf5Group group, const MeasuredCurve& curve) {
 }
 
 void write_scan_groups(Hdf5Group scans, const PartResults& part) {
-  for (const ScanResult& scan : part.scans) {
-    const std::string power = scan.power == ScanSpec::Power::stiffness ? "stiffness" : "adhesion";
-    const std::string name = group_name(fmt::format("{} R={} m, other power {}, {}", power, scan.radius, scan.other_power, scan.observable));
-    Hdf5Group group = scans.create_group(name);
-    group.attribute("power", power);
+  for (std::size_t k = 0; k < part.scans.size(); ++k) {
+    const ScanResult& scan = part.scans[k];
+    Hdf5Group group = scans.create_group(fmt::format("{:04}", k));
+    group.attribute("scanned", scan.power == ScanSpec::Power::stiffness ? "stiffness" : "adhesion");
+    for (const auto& [key, value] : scan.varied) group.attribute(key, value);
+    group.attribute("reference", scan.reference);
     group.attribute("observable", scan.observable);
     group.attribute("radius", scan.radius);
     group.attribute("other_power", scan.other_power);
