@@ -256,6 +256,7 @@ void Simulation::rebuild_with(const PairHistories& pairs) {
   choose_margins(true);
   graph_.reset();
   table_.reset();
+  batches_.clear();  // before the new ones are made: their memory serves again
   const int size = engine_.batch > 0 ? engine_.batch : automatic_batch(particles_.count, engine_.threads, even);
   batches_ = make_batches(particles_, domain_, outer_, size, run);
   fill_inner(batches_, particles_, domain_, inner_, keeps_k_t(), pairs, run);
