@@ -56,11 +56,13 @@ class AlignedArray {
     if (capacity <= capacity_) return;
     capacity = std::max(capacity, capacity_ + capacity_ / 4);
     const std::size_t bytes = capacity * sizeof(T);
-    const bool large = bytes >= huge_page, pooled = pools && !large && bytes >= smallest_pooled;
+    const bool large = bytes >= largest_pooled, pooled = pools && !large && bytes >= smallest_pooled;
     void* block = nullptr;
     std::size_t stagger = 0;
+    std::size_t of_pool = 0;
     if (pooled) {
-      block = take_from_pool(bytes);
+      const PoolBlock from_pool = take_from_pool(bytes);
+      block = from_pool.memory, of_pool = from_pool.bytes, capacity = of_pool / sizeof(T);
     } else {
       const std::size_t alignment = large ? huge_page : 64;
       stagger = large ? 64 * (next_start() % 61) : 0;
@@ -72,7 +74,7 @@ class AlignedArray {
     T* data = reinterpret_cast<T*>(static_cast<char*>(block) + stagger);
     std::copy(data_, data_ + size_, data);
     release();
-    block_ = block, data_ = data, capacity_ = capacity, pooled_ = pooled ? bytes : 0;
+    block_ = block, data_ = data, capacity_ = capacity, pooled_ = of_pool;
   }
 
   T* data() { return data_; }
@@ -88,7 +90,8 @@ class AlignedArray {
   const T* end() const { return data_ + size_; }
 
  private:
-  static constexpr std::size_t huge_page = std::size_t{1} << 21, smallest_pooled = 2048;
+  // An array of its own takes whole huge pages: half a page too much on average, which is little from eight pages on.
+  static constexpr std::size_t huge_page = std::size_t{1} << 21, smallest_pooled = 2048, largest_pooled = 8 * huge_page;
 #if defined(__SANITIZE_ADDRESS__)
   static constexpr bool pools = false;  // AddressSanitizer guards blocks of its own
 #else
@@ -96,7 +99,7 @@ class AlignedArray {
 #endif
   void release() {
     if (pooled_ > 0)
-      give_to_pool(block_, pooled_);
+      give_to_pool({block_, pooled_});
     else
       std::free(block_);
   }
@@ -106,7 +109,7 @@ class AlignedArray {
   }
 
   void* block_ = nullptr;
-  std::size_t pooled_ = 0;  // bytes asked from the pool; 0: from the heap
+  std::size_t pooled_ = 0;  // bytes of the pool's block; 0: from the heap
   T* data_ = nullptr;
   std::size_t size_ = 0, capacity_ = 0;
 };

@@ -17,15 +17,18 @@ constexpr std::size_t huge_page = std::size_t{1} << 21, largest_slab = std::size
 
 class HugePool {
  public:
-  void* take(std::size_t bytes) {
+  PoolBlock take(std::size_t bytes) {
     const std::size_t size = size_class(bytes);
     const std::lock_guard lock(mutex_);
-    Class& of_size = free_[size];
-    if (!of_size.free.empty()) {
-      void* block = of_size.free.back();
-      of_size.free.pop_back();
+    // Lists of the next rebuild are a little longer or shorter than those before: a block half as large again will do.
+    for (auto of_size = free_.lower_bound(size); of_size != free_.end() && of_size->first <= size + size / 2; ++of_size) {
+      std::vector<void*>& free = of_size->second.free;
+      if (free.empty()) continue;
+      const PoolBlock block{free.back(), of_size->first};
+      free.pop_back();
       return block;
     }
+    Class& of_size = free_[size];
     // Room for every block of this size, so that giving one back never asks for memory.
     if (of_size.free.capacity() <= of_size.blocks) of_size.free.reserve(2 * of_size.blocks + 1);
     if (left_ < size) {  // the rest of the old slab stays unused: less than one block
@@ -38,11 +41,11 @@ class HugePool {
     }
     char* block = at_;
     at_ += size, left_ -= size, ++of_size.blocks;
-    return block;
+    return {block, size};
   }
-  void give(void* block, std::size_t bytes) noexcept {
+  void give(const PoolBlock& block) noexcept {
     const std::lock_guard lock(mutex_);
-    free_[size_class(bytes)].free.push_back(block);
+    free_.find(block.bytes)->second.free.push_back(block.memory);
   }
 
  private:
@@ -73,7 +76,7 @@ HugePool& pool() {
 
 }  // namespace
 
-void* take_from_pool(std::size_t bytes) { return pool().take(bytes); }
-void give_to_pool(void* block, std::size_t bytes) noexcept { pool().give(block, bytes); }
+PoolBlock take_from_pool(std::size_t bytes) { return pool().take(bytes); }
+void give_to_pool(const PoolBlock& block) noexcept { pool().give(block); }
 
 }  // namespace platen

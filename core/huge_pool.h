@@ -8,9 +8,14 @@
 
 namespace platen {
 
-// A block of at least `bytes`, 64-byte aligned. Any thread may ask; memory that is given back is kept for others.
-// Throws std::bad_alloc.
-void* take_from_pool(std::size_t bytes);
-void give_to_pool(void* block, std::size_t bytes) noexcept;  // the same `bytes`
+struct PoolBlock {
+  void* memory = nullptr;
+  std::size_t bytes = 0;
+};
+
+// A block of at least `bytes`, 64-byte aligned, of which all may be used. Any thread may ask; memory that is given back is
+// kept for others. Throws std::bad_alloc.
+PoolBlock take_from_pool(std::size_t bytes);
+void give_to_pool(const PoolBlock& block) noexcept;
 
 }  // namespace platen
