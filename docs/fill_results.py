@@ -73,7 +73,8 @@ class Study:
                 if row["scanned power"] != power:
                     continue
                 errors = ", ".join(f"{p}: {float(e):.3f}" for p, e in zip(row["powers"].split(";"), row["errors over range [-]"].split(";")))
-                minimum = f"{float(row['minimum']):.3f} ± {float(row['uncertainty']):.3f}" if row["minimum"] and row["uncertainty"] else row["minimum"] or "none"
+                minimum = f"{float(row['minimum']):.3f}" if row["minimum"] else "none"
+                minimum += f" ± {float(row['uncertainty']):.3f}" if row["uncertainty"] else ""
                 where = f"{1e3 * float(row['radius [m]']):g} mm, other power {float(row['other power [-]']):g}"
                 rows.append((where, row["observable"], row["seeds"], errors, row["best tried"], minimum))
         return markdown(["curve", "observable", "seeds", "error over range, by power", "best tried", "minimum"], rows) if rows else None
