@@ -63,7 +63,8 @@ class Study:
 
     def figure(self, number):
         said = self.said(number)
-        image = self.image("fig" + number, f"Fig. {number}") if said else None
+        name = "run-time" if number == "11" else "fig" + number
+        image = self.image(name, f"Fig. {number}") if said else None
         return f"{image}\n\n{said}" if image else None
 
     def scan(self, power):
