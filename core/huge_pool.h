@@ -1,7 +1,8 @@
-// Memory on huge pages for arrays that are too small to have a page of their own.
+// Memory on huge pages for arrays that are too small to fill whole pages of their own (core/aligned.h says how small).
 //
-// A bed has dozens to hundreds of lists of ten kilobytes to a megabyte each. On pages of 4 KiB they take more of them than a processor
-// keeps translations for, and every pass over the bed pays for looking them up again, twice over in a virtual machine.
+// A bed has dozens to hundreds of lists of ten kilobytes to a megabyte each. On pages of 4 KiB they take more of them than
+// a processor keeps translations for, and every pass over the bed pays for looking them up again, twice over in a
+// virtual machine.
 #pragma once
 
 #include <cstddef>

@@ -157,8 +157,8 @@ void colour(std::vector<Batch>& batches) {
 int automatic_batch(std::int32_t particles, int threads, bool even) {
   // Fewer and larger batches have fewer pairs across and cost the graph less. Where work lies unevenly, or the colours of
   // many batches make it uneven, about three to eight for each thread even the load out, eight from 2,048 spheres each on,
-  // where a task is long against what the graph takes for it. None has more than 20,000: its sums, 64 bytes a sphere and
-  // those of its halo, then stay below the 2 MiB up to which the pool hands arrays out again at the next rebuild.
+  // where a task is long against what the graph takes for it. None has more than 20,000: larger ones were
+  // no faster [docs/decisions.md].
   threads = std::max(1, threads);
   const int largest = 20000, each = std::max(1, (particles + threads * largest - 1) / (threads * largest));
   const int several = std::clamp(particles / 2048, 3 * threads, 8 * threads);

@@ -63,8 +63,7 @@ class Study:
 
     def figure(self, number):
         said = self.said(number)
-        name = "run-time" if number == "11" else "fig" + number
-        image = self.image(name, f"Fig. {number}") if said else None
+        image = self.image("fig" + number, f"Fig. {number}") if said else None
         return f"{image}\n\n{said}" if image else None
 
     def scan(self, power):

@@ -102,6 +102,8 @@ void write_collapse(const fs::path& file, const PartResults& part) {
   write_whole_file(file, text);
 }
 
+const char* power_name(const ScanResult& scan) { return scan.power == ScanSpec::Power::stiffness ? "stiffness" : "adhesion"; }
+
 void write_scans(const fs::path& file, const PartResults& part) {
   std::string text =
       "scanned power,radius [m],other power [-],observable,seeds,powers,errors over range [-],best "
@@ -109,7 +111,7 @@ void write_scans(const fs::path& file, const PartResults& part) {
   for (const ScanResult& scan : part.scans) {
     const bool found = scan.minimum.has_value();
     text += fmt::format(
-        "{},{},{},{},{},{},{},{},{},{},{},{}\n", scan.power == ScanSpec::Power::stiffness ? "stiffness" : "adhesion",
+        "{},{},{},{},{},{},{},{},{},{},{},{}\n", power_name(scan),
         cell(scan.radius), cell(scan.other_power), scan.observable, scan.seeds, list(scan.powers), list(scan.errors),
         cell(scan.best_tried), found ? cell(scan.minimum->power) : "", found ? cell(scan.minimum->uncertainty) : "",
         found ? cell(scan.minimum->error) : "", found ? (scan.minimum->inside ? "yes" : "no") : "");
@@ -190,7 +192,7 @@ void write_scan_groups(Hdf5Group scans, const PartResults& part) {
   for (std::size_t k = 0; k < part.scans.size(); ++k) {
     const ScanResult& scan = part.scans[k];
     Hdf5Group group = scans.create_group(fmt::format("{:04}", k));
-    group.attribute("scanned", scan.power == ScanSpec::Power::stiffness ? "stiffness" : "adhesion");
+    group.attribute("scanned", power_name(scan));
     for (const auto& [key, value] : scan.varied) group.attribute(key, value);
     group.attribute("reference", scan.reference);
     group.attribute("observable", scan.observable);
