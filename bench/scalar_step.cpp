@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "core/law_constants.h"
+#include "core/morton_order.h"
 #include "core/neighbours.h"
 
 namespace platen::bench {

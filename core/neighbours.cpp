@@ -28,16 +28,6 @@ Bounds bounds_of(const Particles& p) {
   return b;
 }
 
-std::uint64_t spread(std::uint64_t v) {  // 21 bits, two zeros between each
-  v &= 0x1fffff;
-  v = (v | v << 32) & 0x1f00000000ffffULL;
-  v = (v | v << 16) & 0x1f0000ff0000ffULL;
-  v = (v | v << 8) & 0x100f00f00f00f00fULL;
-  v = (v | v << 4) & 0x10c30c30c30c30c3ULL;
-  v = (v | v << 2) & 0x1249249249249249ULL;
-  return v;
-}
-
 // A grid of cells at least `reach` wide over the particles; periodic where the domain is.
 class CellGrid {
  public:
@@ -187,36 +177,6 @@ bool work_is_even(const std::vector<Batch>& batches, int parts) {
 
 int BatchOf::operator()(std::int32_t particle) const {
   return static_cast<int>(std::upper_bound(starts.begin(), starts.end(), particle) - starts.begin()) - 1;
-}
-
-std::vector<std::int32_t> morton_order(const Particles& particles) {
-  const Bounds b = bounds_of(particles);
-  double side = 0.0;
-  for (int axis = 0; axis < 3; ++axis) side = std::max(side, b.high[axis] - b.low[axis]);
-  // 11 bits an axis: finer cells than any bed has spheres across. Sorted by three passes over 11 bits each.
-  const double scale = side > 0.0 ? 2047.0 / side : 0.0;
-  const auto n = static_cast<std::size_t>(particles.count);
-  std::vector<std::uint64_t> keys(n), other_keys(n);
-  std::vector<std::int32_t> order(n), other_order(n);
-  for (std::size_t k = 0; k < n; ++k) {
-    const auto cell = [&](double x, double low) { return static_cast<std::uint64_t>((x - low) * scale); };
-    keys[k] = spread(cell(particles.x[k], b.low[0])) | spread(cell(particles.y[k], b.low[1])) << 1 |
-              spread(cell(particles.z[k], b.low[2])) << 2;
-    order[k] = static_cast<std::int32_t>(k);
-  }
-  for (int pass = 0; pass < 3; ++pass) {
-    std::array<std::uint32_t, 2049> start{};
-    const auto digit = [&](std::uint64_t key) { return static_cast<std::size_t>(key >> (11 * pass) & 2047); };
-    for (const std::uint64_t key : keys) ++start[digit(key) + 1];
-    for (std::size_t d = 1; d < start.size(); ++d) start[d] += start[d - 1];
-    for (std::size_t k = 0; k < n; ++k) {
-      const std::uint32_t to = start[digit(keys[k])]++;
-      other_keys[to] = keys[k];
-      other_order[to] = order[k];
-    }
-    keys.swap(other_keys), order.swap(other_order);
-  }
-  return order;
 }
 
 std::vector<Batch> make_batches(const Particles& p, const Domain& domain, const Margins& margins, int size,

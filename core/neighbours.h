@@ -37,9 +37,6 @@ inline double distance2(const double* a, const double* b, const Domain& domain) 
   return dx * dx + dy * dy + dz * dz;
 }
 
-// Order along a Morton curve: order[new place] = old place.
-std::vector<std::int32_t> morton_order(const Particles& particles);
-
 // Cuts the particles into batches of about `size` and fills their outer lists with every pair closer than
 // R_i + R_j + both margins. Particles must be in Morton order, rows up to date.
 std::vector<Batch> make_batches(const Particles& particles, const Domain& domain, const Margins& margins, int size,

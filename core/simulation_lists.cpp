@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/float_mode.h"
+#include "core/morton_order.h"
 #include "core/simulation_detail.h"
 
 namespace platen {

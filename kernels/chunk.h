@@ -57,6 +57,17 @@ struct Chunk {
     }
     if constexpr (scene.rolling == Rolling::relative) put<I>(w, at, p.w);
   }
+  // What was fetched of one pair, to another place of the chunk.
+  PLATEN_INLINE void move(int to, int from) {
+    delta[to] = delta[from], v_n[to] = v_n[from];
+    for (int axis = 0; axis < 3; ++axis) n[axis][to] = n[axis][from], v_t[axis][to] = v_t[axis][from];
+    for (int side = 0; side < sides; ++side) {
+      lever[side][to] = lever[side][from];
+      if constexpr (!scene.equal_spheres) R[side][to] = R[side][from], m[side][to] = m[side][from];
+    }
+    if constexpr (scene.rolling == Rolling::relative)
+      for (int axis = 0; axis < 3; ++axis) w[axis][to] = w[axis][from];
+  }
   // Fields of the records of one side, in their order.
   template <class I>
   PLATEN_INLINE void take_fields(int at, int side, typename I::Real (&fields)[8]) const {

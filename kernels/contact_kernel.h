@@ -17,6 +17,7 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
   std::int32_t owner = -1;
   bool fine = true;
   Chunk<scene> chunk;
+  GatheredPairs<typename Interleaved<I>::Type, scene> gathered;
   alignas(64) const double nothing[record_size] = {};
   for (std::int32_t start = 0; start < b.count; start += chunk_size) {
     const int count = start + chunk_size < b.count ? chunk_size : b.count - start;
@@ -27,11 +28,16 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
       for (int at = 0; at < count; at += I::width)
         chunk.template put_pairs<I>(at, fetch_pairs<I, scene, exact, false>(b, c, start + at));
     using Wide = typename Interleaved<I>::Type;
-    const ActiveVectors active = active_vectors<Wide, scene>(chunk, b, c.dt, start, count);
-    fine = law_of_chunk<Wide, scene, exact, guarded>(chunk, b, c, start, active, totals) && fine;
+    ActiveVectors active = active_vectors<Wide, scene>(chunk, b, c.dt, start, count);
+    const bool few = GatheredPairs<Wide, scene>::worth(active);
+    if (few) gathered.take(chunk, b, start, active);
+    const PairBatch seen = few ? gathered.view(b) : b;
+    const std::int32_t first = few ? 0 : start;
+    fine = law_of_chunk<Wide, scene, exact, guarded>(chunk, seen, c, first, active, totals) && fine;
     for (int m = 0; m < active.count; ++m)
       for (int at = active.at[m]; at < active.at[m] + Wide::width; at += I::width)
-        output_pairs<I, scene>(chunk, at, b, c, start + at, nothing, carried, owner);
+        output_pairs<I, scene>(chunk, at, seen, c, first + at, nothing, carried, owner);
+    if (few) gathered.give_back(b);
   }
   totals.out_of_range = totals.out_of_range || !fine;
 }

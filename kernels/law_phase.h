@@ -1,7 +1,7 @@
 // Second phase of the contact kernel: forces and history of pairs, and what they take out of the ledger.
 #pragma once
 
-#include "kernels/chunk.h"
+#include "kernels/active_pairs.h"
 #include "kernels/eepa.h"
 #include "kernels/rolling.h"
 #include "kernels/rounding.h"
@@ -162,33 +162,6 @@ PLATEN_INLINE void for_each_energy(const PairEnergies<I>& energy, const Visit& v
   if constexpr (scene.plasticity) visit(term_plastic, energy.plastic);
   if constexpr (scene.rolling == Rolling::relative) visit(term_rolling, energy.rolling);  // absolute: motion kernel
   if constexpr (scene.exponent != Exponent::one) visit(term_model, energy.model);
-}
-
-// The vectors of a chunk in which something is to be found: where a pair touches, touched at the last step, or has a
-// history to forget. In a bed these are all, in a rain hardly any.
-struct ActiveVectors {
-  int at[chunk_size];
-  int count = 0;
-};
-template <class I, SceneTraits scene>
-PLATEN_INLINE ActiveVectors active_vectors(const Chunk<scene>& chunk, const PairBatch& b, double dt, std::int32_t start, int count) {
-  using Real = typename I::Real;
-  const Real zero = I::set(0.0);
-  ActiveVectors active;
-  for (int at = 0; at < count; at += I::width) {
-    const Real delta = I::load(chunk.delta + at), before = I::fma(I::load(chunk.v_n + at), I::set(dt), delta);
-    bool some = I::any(I::either(delta > zero, before > zero));
-    if (!some) {
-      const std::int32_t k = start + at;
-      Real size = (I::abs(I::load(b.tx + k)) + I::abs(I::load(b.ty + k))) + I::abs(I::load(b.tz + k));
-      if constexpr (scene.plasticity) size = size + I::abs(I::load(b.sp + k));
-      if constexpr (scene.exponent != Exponent::one) size = size + I::abs(I::load(b.k_t_last + k));
-      some = I::any(I::negate(zero >= size));
-    }
-    active.at[active.count] = at;
-    active.count += some;
-  }
-  return active;
 }
 
 // Whether a contact of the chunk is out of its bound [N]. Written so that a NaN counts as too strong.

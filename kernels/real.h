@@ -53,6 +53,7 @@ struct Scalar {
   static PLATEN_INLINE Real where(Mask m, Real a, Real b) { return m ? a : b; }
   static PLATEN_INLINE bool any(Mask m) { return m; }
   static PLATEN_INLINE int count(Mask m) { return m ? 1 : 0; }
+  static PLATEN_INLINE unsigned bits(Mask m) { return m ? 1u : 0u; }
   static PLATEN_INLINE Mask both(Mask a, Mask b) { return a && b; }
   static PLATEN_INLINE Mask either(Mask a, Mask b) { return a || b; }
   static PLATEN_INLINE Mask negate(Mask a) { return !a; }
@@ -126,7 +127,8 @@ struct Avx2 {
   }
   static PLATEN_INLINE Real where(Mask m, Real a, Real b) { return _mm256_blendv_pd(b, a, m); }
   static PLATEN_INLINE bool any(Mask m) { return _mm256_movemask_pd(m) != 0; }
-  static PLATEN_INLINE int count(Mask m) { return __builtin_popcount(static_cast<unsigned>(_mm256_movemask_pd(m))); }
+  static PLATEN_INLINE int count(Mask m) { return __builtin_popcount(bits(m)); }
+  static PLATEN_INLINE unsigned bits(Mask m) { return static_cast<unsigned>(_mm256_movemask_pd(m)); }  // first lane lowest
   static PLATEN_INLINE Mask both(Mask a, Mask b) { return _mm256_and_pd(a, b); }
   static PLATEN_INLINE Mask either(Mask a, Mask b) { return _mm256_or_pd(a, b); }
   static PLATEN_INLINE Mask negate(Mask a) {
@@ -248,6 +250,7 @@ struct Avx512 {
   static PLATEN_INLINE Real where(Mask m, Real a, Real b) { return _mm512_mask_blend_pd(m, b, a); }
   static PLATEN_INLINE bool any(Mask m) { return static_cast<__mmask8>(m) != 0; }
   static PLATEN_INLINE int count(Mask m) { return __builtin_popcount(static_cast<__mmask8>(m)); }
+  static PLATEN_INLINE unsigned bits(Mask m) { return static_cast<__mmask8>(m); }
   // By intrinsics, lest they leave the mask registers.
   static PLATEN_INLINE Mask both(Mask a, Mask b) { return _kand_mask8(static_cast<__mmask8>(a), static_cast<__mmask8>(b)); }
   static PLATEN_INLINE Mask either(Mask a, Mask b) { return _kor_mask8(static_cast<__mmask8>(a), static_cast<__mmask8>(b)); }

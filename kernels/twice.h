@@ -54,6 +54,7 @@ struct Twice {
   }
   static PLATEN_INLINE bool any(const Mask& m) { return I::any(I::either(m.a, m.b)); }
   static PLATEN_INLINE int count(const Mask& m) { return I::count(m.a) + I::count(m.b); }
+  static PLATEN_INLINE unsigned bits(const Mask& m) { return I::bits(m.a) | I::bits(m.b) << half; }
   static PLATEN_INLINE Mask both(const Mask& x, const Mask& y) { return {I::both(x.a, y.a), I::both(x.b, y.b)}; }
   static PLATEN_INLINE Mask either(const Mask& x, const Mask& y) { return {I::either(x.a, y.a), I::either(x.b, y.b)}; }
   static PLATEN_INLINE Mask negate(const Mask& x) { return {I::negate(x.a), I::negate(x.b)}; }

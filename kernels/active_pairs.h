@@ -1,0 +1,108 @@
+// Between fetch and law: which pairs of a chunk have anything to say.
+#pragma once
+
+#include "kernels/chunk.h"
+
+namespace platen {
+
+// The vectors of a chunk in which something is to be found: where a pair touches, touched at the last step, or has a
+// history to forget. In a bed these are all of them and nearly all their pairs, in a rain a pair here and there.
+struct ActiveVectors {
+  int at[chunk_size];
+  unsigned lanes[chunk_size];  // of each, a bit for each pair with something to it; all set where most have
+  int count = 0;
+  int pairs = 0;               // bits set
+};
+
+template <class I, SceneTraits scene>
+PLATEN_INLINE unsigned pairs_with_history(const PairBatch& b, std::int32_t k) {
+  using Real = typename I::Real;
+  Real size = (I::abs(I::load(b.tx + k)) + I::abs(I::load(b.ty + k))) + I::abs(I::load(b.tz + k));
+  if constexpr (scene.plasticity) size = size + I::abs(I::load(b.sp + k));
+  if constexpr (scene.exponent != Exponent::one) size = size + I::abs(I::load(b.k_t_last + k));
+  return I::bits(I::negate(I::set(0.0) >= size));
+}
+
+template <class I, SceneTraits scene>
+PLATEN_INLINE ActiveVectors active_vectors(const Chunk<scene>& chunk, const PairBatch& b, double dt, std::int32_t start, int count) {
+  using Real = typename I::Real;
+  const Real zero = I::set(0.0);
+  constexpr unsigned all = I::width < 32 ? (1u << I::width) - 1u : ~0u;
+  ActiveVectors active;
+  for (int at = 0; at < count; at += I::width) {
+    const Real delta = I::load(chunk.delta + at), before = I::fma(I::load(chunk.v_n + at), I::set(dt), delta);
+    unsigned lanes = I::bits(I::either(delta > zero, before > zero));
+    if (2 * __builtin_popcount(lanes) > I::width)
+      lanes = all;  // to look at the history of the rest would cost more than it saves
+    else
+      lanes |= pairs_with_history<I, scene>(b, start + at);
+    active.at[active.count] = at;
+    active.lanes[active.count] = lanes;
+    active.count += lanes != 0;
+    active.pairs += __builtin_popcount(lanes);
+  }
+  return active;
+}
+
+// The active pairs of a chunk drawn together, where they would fill half as many vectors or fewer: columns move to the
+// front of the chunk, history and indices into arrays of their own, which `view` shows to law and output. What is left
+// out is apart, was apart and has no history, so it has no force and stays as it is.
+//
+//   pairs of the chunk  . a . . . b . . . . c . . d . .        a b c d - - - -        in the chunk, and in `view`
+//                                                              (-: padding, apart)
+template <class I, SceneTraits scene>
+class GatheredPairs {
+ public:
+  static constexpr bool worth(const ActiveVectors& active) {
+    return I::width > 1 && 2 * ((active.pairs + I::width - 1) / I::width) <= active.count;
+  }
+
+  // Gathers; `active` then describes what is gathered.
+  void take(Chunk<scene>& chunk, const PairBatch& b, std::int32_t start, ActiveVectors& active) {
+    int n = 0;
+    for (int m = 0; m < active.count; ++m)
+      for (unsigned lanes = active.lanes[m]; lanes != 0; lanes &= lanes - 1) {
+        const int at = active.at[m] + __builtin_ctz(lanes);
+        const std::int32_t k = start + at;
+        chunk.move(n, at);
+        from_[n] = k, i_[n] = b.i[k], slot_j_[n] = b.slot_j[k];
+        tx_[n] = b.tx[k], ty_[n] = b.ty[k], tz_[n] = b.tz[k];
+        if constexpr (scene.plasticity) sp_[n] = b.sp[k];
+        if constexpr (scene.exponent != Exponent::one) k_t_last_[n] = b.k_t_last[k];
+        ++n;
+      }
+    count_ = n;
+    active.count = 0, active.pairs = n;
+    for (int at = 0; at < n; at += I::width) active.at[active.count++] = at;
+    for (; n % I::width != 0; ++n) {  // at least one pair is there, and before it in memory
+      chunk.move(n, n - 1);
+      chunk.delta[n] = -1.0, chunk.v_n[n] = 0.0;
+      i_[n] = i_[n - 1], slot_j_[n] = i_[n] - b.first;
+      tx_[n] = ty_[n] = tz_[n] = sp_[n] = k_t_last_[n] = 0.0;
+    }
+  }
+
+  PairBatch view(const PairBatch& b) {
+    PairBatch v = b;
+    v.i = i_, v.slot_j = slot_j_;
+    v.tx = tx_, v.ty = ty_, v.tz = tz_, v.sp = sp_, v.k_t_last = k_t_last_;
+    return v;
+  }
+
+  void give_back(const PairBatch& b) const {
+    for (int n = 0; n < count_; ++n) {
+      const std::int32_t k = from_[n];
+      b.tx[k] = tx_[n], b.ty[k] = ty_[n], b.tz[k] = tz_[n];
+      if constexpr (scene.plasticity) b.sp[k] = sp_[n];
+      if constexpr (scene.exponent != Exponent::one) b.k_t_last[k] = k_t_last_[n];
+    }
+  }
+
+ private:
+  using Column = typename Chunk<scene>::Column;
+  alignas(64) Column tx_, ty_, tz_, sp_, k_t_last_;
+  alignas(64) std::int32_t from_[chunk_size], i_[chunk_size], slot_j_[chunk_size];
+  int count_ = 0;
+};
+
+}  // namespace platen

@@ -1,0 +1,84 @@
+// The order of particles in memory: a permutation, neighbours close to each other, whatever shape the bed has.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "core/morton_order.h"
+#include "tests/scenes.h"
+
+namespace platen {
+namespace {
+
+Particles grid(int nx, int ny, int nz) {
+  Particles p;
+  p.resize(nx * ny * nz, true);
+  p.common_radius = 0.5;
+  scenes::Sequence random(3);
+  std::size_t at = 0;
+  for (int k = 0; k < nz; ++k)
+    for (int j = 0; j < ny; ++j)
+      for (int i = 0; i < nx; ++i, ++at) {
+        const auto jitter = [&](int n) { return n > 1 ? random.between(-0.1, 0.1) : 0.0; };
+        p.rank[at] = static_cast<std::int32_t>(at);
+        p.x[at] = i + jitter(nx), p.y[at] = j + jitter(ny), p.z[at] = k + jitter(nz);
+      }
+  return p;
+}
+
+bool is_permutation(std::vector<std::int32_t> order, std::int32_t count) {
+  std::sort(order.begin(), order.end());
+  if (order.size() != static_cast<std::size_t>(count)) return false;
+  for (std::int32_t k = 0; k < count; ++k)
+    if (order[static_cast<std::size_t>(k)] != k) return false;
+  return true;
+}
+
+// Of the pairs next to each other on the grid, the share whose places in memory lie further apart than `window`.
+double far_apart(const std::vector<std::int32_t>& order, int nx, int ny, int nz, int window) {
+  std::vector<int> place(order.size());
+  for (std::size_t k = 0; k < order.size(); ++k) place[static_cast<std::size_t>(order[k])] = static_cast<int>(k);
+  int pairs = 0, far = 0;
+  const auto of = [&](int i, int j, int k) { return place[static_cast<std::size_t>((k * ny + j) * nx + i)]; };
+  const auto look = [&](int a, int b) { ++pairs, far += std::abs(a - b) > window; };
+  for (int k = 0; k < nz; ++k)
+    for (int j = 0; j < ny; ++j)
+      for (int i = 0; i < nx; ++i) {
+        if (i + 1 < nx) look(of(i, j, k), of(i + 1, j, k));
+        if (j + 1 < ny) look(of(i, j, k), of(i, j + 1, k));
+        if (k + 1 < nz) look(of(i, j, k), of(i, j, k + 1));
+      }
+  return static_cast<double>(far) / pairs;
+}
+
+TEST(MortonOrder, IsAPermutationOfAnyBed) {
+  for (const auto& n : std::vector<std::array<int, 3>>{{1, 1, 1}, {1, 1, 5}, {7, 1, 1}, {1, 9, 4}, {6, 5, 1}, {40, 3, 2}, {3, 40, 60}, {20, 20, 20}})
+    for (const int layer : {1, 30, 1000000}) {
+      const Particles p = grid(n[0], n[1], n[2]);
+      EXPECT_TRUE(is_permutation(morton_order(p, layer), p.count)) << n[0] << " x " << n[1] << " x " << n[2] << ", layers of " << layer;
+    }
+  Particles one_place = grid(3, 3, 3);
+  for (auto* column : {&one_place.x, &one_place.y, &one_place.z}) std::fill(column->begin(), column->end(), 0.25);
+  EXPECT_TRUE(is_permutation(morton_order(one_place), 27));
+}
+
+TEST(MortonOrder, DependsOnPlacesAlone) {
+  Particles p = grid(12, 9, 15);
+  const auto order = morton_order(p);
+  p.permute(order);
+  const auto again = morton_order(p);
+  for (std::size_t k = 0; k < again.size(); ++k) EXPECT_EQ(again[k], static_cast<std::int32_t>(k));
+}
+
+// One layer of a bar is 200 spheres here: partners in it and in the next one lie within two layers. What is further away
+// lies across the sides of bars, each 14 spheres wide.
+TEST(MortonOrder, NeighboursAreWithinTwoLayers) {
+  for (const auto& n : std::vector<std::array<int, 3>>{{40, 14, 14}, {14, 40, 14}}) {
+    EXPECT_EQ(far_apart(morton_order(grid(n[0], n[1], n[2]), 200), n[0], n[1], n[2], 2 * 200), 0.0);
+  }
+  EXPECT_LT(far_apart(morton_order(grid(42, 42, 42), 200), 42, 42, 42, 2 * 200), 2.0 / 3.0 * 2.0 / 42 + 0.01);
+}
+
+}  // namespace
+}  // namespace platen
