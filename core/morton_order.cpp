@@ -21,6 +21,7 @@ class Cuts {
  public:
   Cuts() = default;
   Cuts(const AlignedArray<double>& x, std::int32_t count) {
+    if (count == 0) return;
     const auto [low, high] = std::minmax_element(x.begin(), x.begin() + count);
     low_ = *low, extent_ = *high - *low;
   }
@@ -29,7 +30,7 @@ class Cuts {
   int parts() const { return parts_; }
   void cut(double parts, int most) { parts_ = static_cast<int>(std::clamp(std::round(parts), 1.0, static_cast<double>(most))); }
   int part(double x) const {
-    return extent_ > 0.0 ? std::min(static_cast<int>((x - low_) / extent_ * parts_), parts_ - 1) : 0;
+    return extent_ > 0.0 ? std::min(static_cast<int>(std::max(0.0, (x - low_) / extent_ * parts_)), parts_ - 1) : 0;
   }
   double from_edge(double x, int part) const { return std::max(0.0, x - low_ - part * width()); }
 
@@ -42,7 +43,7 @@ class Cuts {
 class Sweep {
  public:
   Sweep(const Particles& p, int layer) : p_(p), axes_{Cuts(p.x, p.count), Cuts(p.y, p.count), Cuts(p.z, p.count)} {
-    along_ = axes_[1].extent() > axes_[0].extent() ? 1 : 0;
+    along_ = axes_[1].extent() > 1.01 * axes_[0].extent() ? 1 : 0;  // a square base: x, whatever the last digits say
     across_ = 1 - along_;
     Cuts &along = axes_[along_], &across = axes_[across_], &up = axes_[2];
     const double volume = along.extent() * across.extent() * up.extent();
@@ -50,8 +51,9 @@ class Sweep {
     if (apart > 0.0) {  // else the bed is flat, and one layer
       along.cut(along.extent() / apart, most_layers);
       // Bars with a section as nearly square as can be.
-      const double section = across.extent() * up.extent() / std::max(1.0, p.count / (static_cast<double>(layer) * along.parts()));
-      across.cut(across.extent() / std::sqrt(section), most_bars);
+      const double bars = std::max(1.0, p.count / (static_cast<double>(layer) * along.parts()));
+      const double section = across.extent() * up.extent() / bars;
+      across.cut(std::min(bars, across.extent() / std::sqrt(section)), most_bars);
       up.cut(across.width() * up.extent() / section, most_bars);
     }
     const double widest = std::max({along.width(), across.width(), up.width()});
@@ -73,7 +75,7 @@ class Sweep {
     return (static_cast<std::uint64_t>(bar) * most_layers + static_cast<std::uint64_t>(layer)) << inside_bits | inside;
   }
 
-  static constexpr int inside_bits = 24, layer_bits = 11, bar_bits = 9;
+  static constexpr int inside_bits = 24, layer_bits = 11, bar_bits = 9;  // one more than 256 bars need, for whole digits
 
  private:
   static constexpr int most_layers = 1 << layer_bits, most_bars = 16;  // in each of two directions

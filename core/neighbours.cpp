@@ -1,7 +1,6 @@
 #include "core/neighbours.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 

@@ -1,4 +1,4 @@
-// Rebuild: Morton order, batches, outer lists, ownership [docs/architecture.md, "Lists"]. Nothing here can change a bit
+// Rebuild: batches, outer lists, ownership [docs/architecture.md, "Lists"]. Nothing here can change a bit
 // of the result: lists only say which pairs are looked at, and sums do not depend on their order.
 #pragma once
 

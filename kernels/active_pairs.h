@@ -54,10 +54,10 @@ template <class I, SceneTraits scene>
 class GatheredPairs {
  public:
   static constexpr bool worth(const ActiveVectors& active) {
-    return I::width > 1 && 2 * ((active.pairs + I::width - 1) / I::width) <= active.count;
+    return I::width > 1 && active.count > 0 && 2 * ((active.pairs + I::width - 1) / I::width) <= active.count;
   }
 
-  // Gathers; `active` then describes what is gathered.
+  // Gathers; `active` then describes what is gathered, but for its `lanes`.
   void take(Chunk<scene>& chunk, const PairBatch& b, std::int32_t start, ActiveVectors& active) {
     int n = 0;
     for (int m = 0; m < active.count; ++m)
@@ -74,7 +74,7 @@ class GatheredPairs {
     count_ = n;
     active.count = 0, active.pairs = n;
     for (int at = 0; at < n; at += I::width) active.at[active.count++] = at;
-    for (; n % I::width != 0; ++n) {  // at least one pair is there, and before it in memory
+    for (; n % I::width != 0; ++n) {  // never entered with n = 0, so that n - 1 is a pair
       chunk.move(n, n - 1);
       chunk.delta[n] = -1.0, chunk.v_n[n] = 0.0;
       i_[n] = i_[n - 1], slot_j_[n] = i_[n] - b.first;
@@ -84,7 +84,7 @@ class GatheredPairs {
 
   PairBatch view(const PairBatch& b) {
     PairBatch v = b;
-    v.i = i_, v.slot_j = slot_j_;
+    v.i = i_, v.slot_j = slot_j_, v.j = nullptr;  // fetched already
     v.tx = tx_, v.ty = ty_, v.tz = tz_, v.sp = sp_, v.k_t_last = k_t_last_;
     return v;
   }

@@ -85,6 +85,10 @@ class RealChecks {
         return least;
       };
       each("least of two", SingleOf<Two>::min(Two::load(nan_in), I::load(so_far)), wanted);
+      const double limits[] = {0.6, 1.1, 0.1, 3.0};
+      unsigned below = 0;
+      for (int lane = 0; lane < 2 * W; ++lane) below |= (nan_in[lane] < limits[which] ? 1u : 0u) << lane;
+      equal("bits of two", Two::bits(Two::load(nan_in) < Two::set(limits[which])), below);
       each("sum of two", SingleOf<Two>::sum(Two::load(nan_in)), [&](int lane) { return nan_in[lane] + nan_in[lane + W]; });
     }
   }
@@ -114,7 +118,10 @@ class RealChecks {
         each("either", I::where(I::either(a < b, b < c), a, c), [&](int l) { return A(l) < B(l) || B(l) < C(l) ? A(l) : C(l); });
         each("negate", I::where(I::negate(a < b), a, c), [&](int l) { return A(l) < B(l) ? C(l) : A(l); });
         int count = 0;
-        for (int l = 0; l < W; ++l) count += A(l) < B(l) ? 1 : 0;
+        unsigned less = 0;  // the first lane lowest
+        for (int l = 0; l < W; ++l) count += A(l) < B(l) ? 1 : 0, less |= (A(l) < B(l) ? 1u : 0u) << l;
+        equal("bits", I::bits(a < b), less);
+        equal("bits of negated", I::bits(I::negate(a < b)), ~less & ((1u << W) - 1u));
         equal("count", I::count(a < b), count);
         equal("any", I::any(a < b) ? 1.0 : 0.0, count > 0 ? 1.0 : 0.0);
         equal("any of negated", I::any(I::negate(a < b)) ? 1.0 : 0.0, count < W ? 1.0 : 0.0);

@@ -125,6 +125,8 @@ TEST(Bits, TouchingPairsAreDrawnTogetherWhereFewTouch) {
     BedOptions o;
     o.nx = 6, o.ny = 6, o.nz = 6, o.speed = 1.0, o.spread = c.spread, o.spacing = c.spread > 0.0 ? 2.1 : 2.3;
     std::set<std::uint64_t> hashes;
+    std::set<double> dissipated;
+    std::set<std::size_t> counts;
     for (const InstructionSet set : available_instruction_sets())
       for (const double gap : {0.8, 0.02}) {  // of R; the second lists hardly more than what touches
         EngineOptions engine = options(set, true, c.scene);
@@ -139,8 +141,12 @@ TEST(Bits, TouchingPairsAreDrawnTogetherWhereFewTouch) {
         }
         EXPECT_GT(few, 1);
         hashes.insert(sim.state_hash());
+        dissipated.insert(sim.measure().ledger.dissipated());
+        counts.insert(sim.snapshot().contacts.size());
       }
     EXPECT_EQ(hashes.size(), 1u);
+    EXPECT_EQ(dissipated.size(), 1u);  // of exponents other than 1 also k_t of the step before, which no hash shows
+    EXPECT_EQ(counts.size(), 1u);
   }
 }
 

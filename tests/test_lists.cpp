@@ -199,7 +199,7 @@ TEST(AutomaticBatch, EvenWork) {
   EXPECT_FALSE(work_is_even(batches_with(1000, {3000}), 0));
   EXPECT_TRUE(work_is_even(batches_with(1000, {3000, 3000, 3000}), 2));  // the middle batch counts half for each part
   EXPECT_TRUE(work_is_even(batches_with(1000, {0, 6000, 0}), 2));
-  EXPECT_FALSE(work_is_even(batches_with(1000, {6000, 0, 0}), 2));       // a rain: all pairs at one end
+  EXPECT_FALSE(work_is_even(batches_with(1000, {6000, 0, 0}), 2));       // a free top: all pairs at one end
   EXPECT_FALSE(work_is_even(batches_with(1000, {3000, 3000, 2000, 2000}), 2));
   EXPECT_TRUE(work_is_even(batches_with(1000, {6000, 0, 0}), 1));
 }

@@ -2,8 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <cstdlib>
+#include <utility>
+#include <vector>
 
 #include "core/morton_order.h"
 #include "tests/scenes.h"
@@ -52,7 +54,8 @@ double far_apart(const std::vector<std::int32_t>& order, int nx, int ny, int nz,
   return static_cast<double>(far) / pairs;
 }
 
-TEST(MortonOrder, IsAPermutationOfAnyBed) {
+// Whatever the keys are, sorting makes a permutation: this looks for crashes.
+TEST(MortonOrder, TakesBedsOfAnyShape) {
   for (const auto& n : std::vector<std::array<int, 3>>{{1, 1, 1}, {1, 1, 5}, {7, 1, 1}, {1, 9, 4}, {6, 5, 1}, {40, 3, 2}, {3, 40, 60}, {20, 20, 20}})
     for (const int layer : {1, 30, 1000000}) {
       const Particles p = grid(n[0], n[1], n[2]);
@@ -63,13 +66,23 @@ TEST(MortonOrder, IsAPermutationOfAnyBed) {
   EXPECT_TRUE(is_permutation(morton_order(one_place), 27));
 }
 
+// The same spheres in another order to begin with come to lie in the same order.
 TEST(MortonOrder, DependsOnPlacesAlone) {
-  Particles p = grid(12, 9, 15);
-  const auto order = morton_order(p);
-  p.permute(order);
-  const auto again = morton_order(p);
-  for (std::size_t k = 0; k < again.size(); ++k) EXPECT_EQ(again[k], static_cast<std::int32_t>(k));
+  const Particles p = grid(12, 9, 15);
+  Particles mixed = grid(12, 9, 15);
+  scenes::Sequence random(7);
+  for (std::size_t k = static_cast<std::size_t>(p.count) - 1; k > 0; --k) {
+    const auto other = static_cast<std::size_t>(random.next() * static_cast<double>(k + 1));
+    for (auto* column : {&mixed.x, &mixed.y, &mixed.z}) std::swap((*column)[k], (*column)[other]);
+  }
+  const auto order = morton_order(p), order_mixed = morton_order(mixed);
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const auto a = static_cast<std::size_t>(order[k]), b = static_cast<std::size_t>(order_mixed[k]);
+    ASSERT_TRUE(p.x[a] == mixed.x[b] && p.y[a] == mixed.y[b] && p.z[a] == mixed.z[b]) << k;
+  }
 }
+
+TEST(MortonOrder, OfNothing) { EXPECT_TRUE(morton_order(Particles()).empty()); }
 
 // One layer of a bar is 200 spheres here: partners in it and in the next one lie within two layers. What is further away
 // lies across the sides of bars, each 14 spheres wide.
@@ -77,6 +90,8 @@ TEST(MortonOrder, NeighboursAreWithinTwoLayers) {
   for (const auto& n : std::vector<std::array<int, 3>>{{40, 14, 14}, {14, 40, 14}}) {
     EXPECT_EQ(far_apart(morton_order(grid(n[0], n[1], n[2]), 200), n[0], n[1], n[2], 2 * 200), 0.0);
   }
+  // A flat bed has layers of far fewer spheres, and no bars.
+  EXPECT_EQ(far_apart(morton_order(grid(60, 60, 2), 500), 60, 60, 2, 2 * 120), 0.0);
   EXPECT_LT(far_apart(morton_order(grid(42, 42, 42), 200), 42, 42, 42, 2 * 200), 2.0 / 3.0 * 2.0 / 42 + 0.01);
 }
 
