@@ -8,6 +8,7 @@
 //   beta_n^2 = 4 z (n+1)/(2n) m* K1;  beta_t^2 = ratio beta_n^2   [Eq. 4, 7, A8]
 #pragma once
 
+#include "kernels/five_thirds.h"
 #include "kernels/power.h"
 #include "kernels/scene.h"
 #include "kernels/vec3.h"
@@ -28,6 +29,15 @@ PLATEN_INLINE typename I::Real power_of(typename I::Real x, double p) {
   I::store(v, x);
   for (int lane = 0; lane < I::width; ++lane) v[lane] = power(v[lane], p);
   return I::load(v);
+}
+
+// x^p - y^p; without a power where both are the same.
+template <class I>
+PLATEN_INLINE typename I::Real power_change(typename I::Real x, typename I::Real y, double p) {
+  alignas(64) double a[I::width], b[I::width];
+  I::store(a, x), I::store(b, y);
+  for (int lane = 0; lane < I::width; ++lane) a[lane] = a[lane] == b[lane] ? 0.0 : power(a[lane], p) - power(b[lane], p);
+  return I::load(a);
 }
 
 // s = delta^n for delta >= 0.
@@ -120,9 +130,11 @@ PLATEN_INLINE typename I::Real plastic_dissipation(typename I::Real sp_old, type
   const Real weight = I::where(sp > sp_old, I::set(c.plastic_loading), I::set(c.plastic_adhesive));
   if constexpr (n == Exponent::one) {
     return weight * ((sp - sp_old) * (sp + sp_old));
+  } else if constexpr (n == Exponent::three_halves) {
+    return weight * (five_thirds<I>(sp) - five_thirds<I>(sp_old));
   } else {
     const double p = (c.exponent + 1.0) / c.exponent;
-    return weight * (power_of<I>(sp, p) - power_of<I>(sp_old, p));
+    return weight * power_change<I>(sp, sp_old, p);  // most plastic overlaps stand still in most steps
   }
 }
 

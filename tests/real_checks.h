@@ -9,6 +9,7 @@
 #include <cstring>
 #include <limits>
 
+#include "kernels/five_thirds.h"
 #include "kernels/twice.h"
 
 namespace platen {
@@ -161,6 +162,20 @@ class RealChecks {
         worst = worst > std::fabs(error) ? worst : std::fabs(error);
       }
     }
+    double worst_power = 0.0;
+    for (int k = 0; k < 20000; ++k) {
+      double x[W], y[W];
+      for (int lane = 0; lane < W; ++lane) x[lane] = std::ldexp(1.0 + (k * W + lane) % 9973 * 1e-4, (k * 37 + lane) % 220 - 200);
+      I::store(y, five_thirds<I>(I::load(x)));
+      for (int lane = 0; lane < W; ++lane) {
+        const long double exact = std::pow(static_cast<long double>(x[lane]), 5.0L / 3.0L);
+        const double error = static_cast<double>((y[lane] - exact) / exact);
+        worst_power = worst_power > std::fabs(error) ? worst_power : std::fabs(error);
+      }
+    }
+    ++report_.compared;
+    if (!(worst_power < 0x1p-51)) report_.fail(report_.context, "five thirds, relative error", worst_power, 0x1p-51);
+    each("five thirds of nothing", five_thirds<I>(I::set(0.0)), [](int) { return 0.0; });
     ++report_.compared;
     if (!(worst < 4.0 * 0x1p-53)) report_.fail(report_.context, "fast inverse sqrt, relative error", worst, 4.0 * 0x1p-53);
   }
