@@ -94,6 +94,13 @@ class StudyPrinter {
   bool shown_ = false;
 };
 
+// "2 at a time", "one at a time", or both where some runs are timed.
+std::string runs_at_a_time(const StudyPlan& plan, int jobs) {
+  const auto timed = static_cast<std::size_t>(std::count_if(plan.jobs.begin(), plan.jobs.end(), [](const Job& job) { return job.timed; }));
+  const std::string many = jobs == 1 || timed == plan.jobs.size() ? "one at a time" : fmt::format("{} at a time", jobs);
+  return timed == 0 || many == "one at a time" ? many : fmt::format("{}, then {} timed ones one at a time", many, timed);
+}
+
 int exit_code_of(const std::vector<JobOutcome>& outcomes) {
   for (const JobOutcome& outcome : outcomes)
     if (outcome.state == JobState::failed)
@@ -133,8 +140,8 @@ int study_command(const StudyCommand& command) {
                    outcome.steal_seconds ? fmt::format(", steal time {:.1f} s", *outcome.steal_seconds) : "");
   };
   if (!command.quiet)
-    spdlog::info("{}: {} runs, {} at a time, into {}", command.study_file.filename().string(), plan.jobs.size(),
-                 options.jobs, command.folder.string());
+    spdlog::info("{}: {} runs, {}, into {}", command.study_file.filename().string(), plan.jobs.size(),
+                 runs_at_a_time(plan, options.jobs), command.folder.string());
   const std::vector<JobOutcome> outcomes = run_jobs(plan, options);
   printer.clear();
 
