@@ -48,7 +48,8 @@ class Study:
         return sorted(self.folder.glob(name)) + sorted(self.folder.glob("*/" + name))
 
     def said(self, what):
-        rows = [s for s in self.statements if s["figure"] == what]
+        study, _, figure = what.rpartition("/")  # "figure" of any study, or "study/figure"
+        rows = [s for s in self.statements if s["figure"] == figure and study in ("", s["study"])]
         if not rows:
             return None
         return markdown(["statement", "number", "seeds", ""], [(s["statement"], s["number"], s["seeds"], shown(s["verdict"])) for s in rows])
