@@ -23,19 +23,22 @@ class Cuts {
   Cuts(const AlignedArray<double>& x, std::int32_t count) {
     if (count == 0) return;
     const auto [low, high] = std::minmax_element(x.begin(), x.begin() + count);
-    low_ = *low, extent_ = *high - *low;
+    low_ = *low, extent_ = width_ = *high - *low;
+    per_ = extent_ > 0.0 ? 1.0 / extent_ : 0.0;
   }
   double extent() const { return extent_; }
-  double width() const { return extent_ / parts_; }
+  double width() const { return width_; }
   int parts() const { return parts_; }
-  void cut(double parts, int most) { parts_ = static_cast<int>(std::clamp(std::round(parts), 1.0, static_cast<double>(most))); }
-  int part(double x) const {
-    return extent_ > 0.0 ? std::min(static_cast<int>(std::max(0.0, (x - low_) / extent_ * parts_)), parts_ - 1) : 0;
+  void cut(double parts, int most) {
+    parts_ = static_cast<int>(std::clamp(std::round(parts), 1.0, static_cast<double>(most)));
+    width_ = extent_ / parts_, per_ = extent_ > 0.0 ? parts_ / extent_ : 0.0;
   }
-  double from_edge(double x, int part) const { return std::max(0.0, x - low_ - part * width()); }
+  int part(double x) const { return std::min(static_cast<int>(std::max(0.0, (x - low_) * per_)), parts_ - 1); }
+  double from_edge(double x, int part) const { return std::max(0.0, x - low_ - part * width_); }
 
  private:
   double low_ = 0.0, extent_ = 0.0;
+  double width_ = 0.0, per_ = 0.0;  // of a part, and its inverse
   int parts_ = 1;
 };
 

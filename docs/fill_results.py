@@ -8,7 +8,7 @@ them has is left as it is. Kinds:
 
     figure N        the study's image, copied to docs/results/, and the statements on that figure
     image NAME      an image alone
-    statements WHAT the statements of a figure column: filling, S2, quasi-static, ...
+    statements WHAT the statements of a figure column: filling, S2, ...; STUDY/WHAT where several studies have it
     scan POWER      the best of the tried powers and the minimum, by observable: stiffness, adhesion
     collapse        collapse errors of all curves
     runs            steps, time steps, ledger and wall time of every run, times of every seed

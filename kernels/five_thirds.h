@@ -8,7 +8,7 @@
 
 namespace platen {
 
-// x >= 0, and not so small that x^(1/3) matters: below 1e-200 it may be 0. Error below 2^-51 of the result.
+// x >= 0. Error below 2^-51 of the result; 0 where that is too small for a double.
 //
 // x^(5/3) = x (x y) with y = x^(-1/3), for which y <- y (4 - x y^3)/3 doubles the correct digits. The first guess, within 4 %,
 // divides the exponent, which stands in the upper bits, by -3.

@@ -97,8 +97,8 @@ class StudyPrinter {
 // "2 at a time", "one at a time", or both where some runs are timed.
 std::string runs_at_a_time(const StudyPlan& plan, int jobs) {
   const auto timed = static_cast<std::size_t>(std::count_if(plan.jobs.begin(), plan.jobs.end(), [](const Job& job) { return job.timed; }));
-  const std::string many = jobs == 1 || timed == plan.jobs.size() ? "one at a time" : fmt::format("{} at a time", jobs);
-  return timed == 0 || many == "one at a time" ? many : fmt::format("{}, then {} timed ones one at a time", many, timed);
+  if (jobs == 1 || timed == plan.jobs.size()) return "one at a time";
+  return fmt::format("{} at a time", jobs) + (timed > 0 ? fmt::format(", then {} timed ones one at a time", timed) : "");
 }
 
 int exit_code_of(const std::vector<JobOutcome>& outcomes) {
