@@ -55,7 +55,7 @@ struct Batch {
   std::int64_t plate_energy[term_count] = {};
   std::int64_t plate_work = 0;
   std::int64_t rolling = 0;
-  double largest_pace = 0.0;          // largest speed^2 over room^2 of a run of steps [1/s2]
+  double path = 0.0;                  // over a run of steps: sum of the largest way of a step, in units of the room of who goes it
   bool out_of_range = false;
 };
 

@@ -33,6 +33,7 @@ struct Particles {
   void resize(std::int32_t n, bool equal_spheres);
   void permute(const std::vector<std::int32_t>& order);  // order[new place] = old place
   void write_rows();                                     // rows from the arrays
+  void read_rows();                                      // the other way round
 };
 
 // Mass of a sphere, 4/3 pi R^3 rho [kg].

@@ -132,15 +132,17 @@ void Simulation::setup_laws(const SimulationSetup& setup) {
   const double most = ratio == 1.0 ? 16.0 : power_of_two_above(3.6 * (1.0 + ratio) * (1.0 + ratio));
   c.rolling_share = 2.0 / most;
 
-  // The largest credible contribution of a pair: the k2 branch at an overlap of R/2 plus damping at the speed R omega.
-  // Every factor scales exactly under a similarity with powers of two.
+  // The largest credible contribution of a pair: the steepest branch at an overlap of R/2 plus damping at the speed
+  // R omega. Every factor scales exactly under a similarity with powers of two.
   const double deep = 0.5 * R, s = std::pow(deep, n), slope = n * c.k2 * std::pow(deep, n - 1.0);
   const double fastest = R * std::sqrt(slope / heaviest);
   const double beta = std::sqrt(c.damping * (0.5 * heaviest) * (n * c.k1 * std::pow(deep, n - 1.0)));
-  const double F = power_of_two_above(c.k2 * s + std::fabs(c.f0) + beta * fastest);
+  const double F = power_of_two_above(std::max(c.k2, c.k_adh) * s + std::fabs(c.f0) + beta * fastest);
   c.force = {1.5 * 0x1p52 * (F * most * 0x1p-53), F, 1.0 / (F * most * 0x1p-53)};
   const double E = power_of_two_above(F * R), q = E * chunk_size * 0x1p-53;
   c.energy = {1.5 * 0x1p52 * q, E, 1.0 / q};
+  // A force beyond its bound takes an overlap above R/2, a lever below 3/4; a friction above 1 may give one at any overlap.
+  c.watched_lever = c.mu > 1.0 ? 2.0 : 0.75;
   energy_unit_ = E * 0x1p-60;
 
   PlateConstants& p = plate_law_;
@@ -248,13 +250,15 @@ void Simulation::integrate(Batch& b, const MotionConstants& c) {
     for (auto* a : {&p.x, &p.y, &p.z, &p.vx, &p.vy, &p.vz, &p.ux, &p.uy, &p.uz}) (*a)[k] = 0.0;
     p.image[2 * k] = p.image[2 * k + 1] = 0;
   }
-  b.largest_pace = std::max(b.largest_pace, totals.largest_pace);
+  b.path += std::sqrt(totals.largest_pace) * c.drift;
   b.rolling += totals.rolling;
   b.out_of_range = b.out_of_range || totals.out_of_range;
 }
 
-void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law) {
-  merged_[static_cast<std::size_t>(&b - batches_.data())] = 0;
+void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law, bool put_aside) {
+  const auto index = static_cast<std::size_t>(&b - batches_.data());
+  merged_[index] = 0;
+  if (put_aside) saved_->batches[index].sums.swap(b.sum);
   std::memset(b.sum.data(), 0, b.sum.size() * sizeof(double));
   const PairBatch pairs{particles_.rows.data(), b.i.data(), b.j.data(), b.slot_j.data(), b.sp.data(), b.tx.data(),
                         b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum.data(), b.first, b.padded, b.first + b.count,
@@ -285,7 +289,7 @@ void Simulation::run_task(const Task& task) {
   const FloatMode mode;
   Batch& b = batches_[static_cast<std::size_t>(task.batch)];
   if (task.kind != TaskKind::contacts) integrate(b, task.offset == 0 ? first_motion_ : motion_);
-  if (task.kind != TaskKind::integrate) contacts(b, step_ + task.offset + 1, law_, plate_law_);
+  if (task.kind != TaskKind::integrate) contacts(b, step_ + task.offset + 1, law_, plate_law_, task.offset == 0);
 }
 
 // Forces at the present step without advancing springs: after something other than motion changed.
@@ -296,7 +300,7 @@ void Simulation::ensure_forces() {
   LawConstants law = law_;
   PlateConstants plate_law = plate_law_;
   law.dt = plate_law.dt = 0.0;
-  parallel(static_cast<int>(batches_.size()), [&](int k) { contacts(batches_[static_cast<std::size_t>(k)], step_, law, plate_law); });
+  parallel(static_cast<int>(batches_.size()), [&](int k) { contacts(batches_[static_cast<std::size_t>(k)], step_, law, plate_law, false); });
   collect();
   forces_valid_ = true;
   bool bad = false;
@@ -319,7 +323,7 @@ void Simulation::collect() {
 }
 
 void Simulation::run_chunk(int steps) {
-  for (Batch& b : batches_) b.largest_pace = 0.0;
+  for (Batch& b : batches_) b.path = 0.0;
   law_.dt = plate_law_.dt = dt_;
   motion_.kick = motion_.drift = dt_;
   motion_.mean_x = mean_[0], motion_.mean_y = mean_[1], motion_.mean_z = mean_[2];
@@ -351,15 +355,15 @@ void Simulation::advance(std::int64_t steps) {
     const int n = prepare_lists(std::min<std::int64_t>(steps, one_by_one ? 1 : at_most));
     save();
     run_chunk(n);
-    double pace = 0.0;
+    double path = 0.0;
     bool bad = false;
     for (const Batch& b : batches_) {
-      pace = std::max(pace, b.largest_pace);
+      path = std::max(path, b.path);
       bad = bad || b.out_of_range;
     }
     // Did the lists hold? If not, a pair may have been missed, and a force out of range may be its consequence: from the
     // saved state once more with wider lists. Lists change no bits, so nobody sees it.
-    if (std::isfinite(pace) && std::sqrt(pace) * (n * dt_) > 1.0) {
+    if (std::isfinite(path) && path > 1.0) {
       double fastest = 0.0;
       for (std::size_t k = 0; k < static_cast<std::size_t>(particles_.count); ++k) fastest = std::max(fastest, own_speed(k));
       const bool known = std::isfinite(fastest);
@@ -375,7 +379,7 @@ void Simulation::advance(std::int64_t steps) {
     }
     at_most = engine_.unroll;
     redo_margin_ = 0.0;
-    if (bad || !std::isfinite(pace)) {
+    if (bad || !std::isfinite(path)) {
       if (n > 1) {  // once more step by step, so that the message tells where it began
         restore();
         one_by_one = true;

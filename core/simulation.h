@@ -140,7 +140,7 @@ class Simulation {
   void setup_laws(const SimulationSetup& setup);
   void merge(Batch& batch);
   void integrate(Batch& batch, const MotionConstants& c);
-  void contacts(Batch& batch, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law);
+  void contacts(Batch& batch, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law, bool put_aside);
   void run_task(const Task& task);
   void collect();
   void rebuild();

@@ -14,12 +14,14 @@ struct Simulation::Workers {
   tbb::task_arena arena;
 };
 
-// Everything that a run of steps changes, for going back.
+// Everything that a run of steps changes, for going back. Rows and sums are written anew in every step, so those of the
+// step before the run are not copied: they are put aside, and the run writes into the arrays that were here.
 struct Simulation::Saved {
-  AlignedArray<double> columns;      // nine of the particles
+  AlignedArray<double> rows;
   AlignedArray<std::int32_t> image;
   struct OfBatch {
-    AlignedArray<double> history, sums;
+    AlignedArray<double> history;    // copies: contacts read and write them in place
+    AlignedArray<double> sums;       // put aside by the first pass over the contacts
     std::int64_t contacts = 0;
   };
   std::vector<OfBatch> batches;

@@ -311,44 +311,35 @@ void Simulation::open_sides() {
 }
 
 void Simulation::save() {
-  const auto n = static_cast<std::size_t>(particles_.padded);
   Saved& s = *saved_;
-  s.columns.resize(9 * n);
-  s.image.resize(2 * n);
+  s.rows.resize(particles_.rows.size());
+  s.rows.swap(particles_.rows);
+  s.image.resize(particles_.image.size());
   s.batches.resize(batches_.size());
   merge_all();
   parallel(static_cast<int>(batches_.size()), [&](int k) {
     Batch& b = batches_[static_cast<std::size_t>(k)];
-    const auto first = static_cast<std::size_t>(b.first), count = static_cast<std::size_t>(b.count);
-    int column = 0;
-    for (auto* a : {&particles_.x, &particles_.y, &particles_.z, &particles_.vx, &particles_.vy, &particles_.vz,
-                    &particles_.ux, &particles_.uy, &particles_.uz})
-      std::copy_n(a->data() + first, count, s.columns.data() + static_cast<std::size_t>(column++) * n + first);
-    std::copy_n(particles_.image.data() + 2 * first, 2 * count, s.image.data() + 2 * first);
+    const auto first = 2 * static_cast<std::size_t>(b.first), count = 2 * static_cast<std::size_t>(b.count);
+    std::copy_n(particles_.image.data() + first, count, s.image.data() + first);
     Saved::OfBatch& to = s.batches[static_cast<std::size_t>(k)];
     for_each_history(b, [&](std::size_t size) { to.history.resize(size); },
                      [&](double* data, std::size_t size, std::size_t at) { std::copy_n(data, size, to.history.data() + at); });
-    to.sums.resize(count * record_size);
-    std::copy_n(b.sum.data(), count * record_size, to.sums.data());
+    to.sums.resize(b.sum.size());
     to.contacts = b.pair_totals.contacts;
   });
 }
 
 void Simulation::restore() {
-  const auto n = static_cast<std::size_t>(particles_.padded);
-  const Saved& s = *saved_;
-  int column = 0;
-  for (auto* a : {&particles_.x, &particles_.y, &particles_.z, &particles_.vx, &particles_.vy, &particles_.vz,
-                  &particles_.ux, &particles_.uy, &particles_.uz})
-    std::copy_n(s.columns.data() + static_cast<std::size_t>(column++) * n, n, a->data());
-  std::copy_n(s.image.data(), 2 * n, particles_.image.data());
-  particles_.write_rows();
+  Saved& s = *saved_;
+  s.rows.swap(particles_.rows);
+  particles_.read_rows();
+  std::copy_n(s.image.data(), s.image.size(), particles_.image.data());
   for (std::size_t k = 0; k < batches_.size(); ++k) {
     Batch& b = batches_[k];
-    const Saved::OfBatch& from = s.batches[k];
+    Saved::OfBatch& from = s.batches[k];
     for_each_history(b, [](std::size_t) {},
                      [&](double* data, std::size_t size, std::size_t at) { std::copy_n(from.history.data() + at, size, data); });
-    std::copy_n(from.sums.data(), from.sums.size(), b.sum.data());
+    from.sums.swap(b.sum);
     merged_[k] = 1;
     const auto contacts = from.contacts;
     b.pair_totals = {};

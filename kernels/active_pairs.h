@@ -2,6 +2,7 @@
 #pragma once
 
 #include "kernels/chunk.h"
+#include "kernels/twice.h"
 
 namespace platen {
 
@@ -23,13 +24,18 @@ PLATEN_INLINE unsigned pairs_with_history(const PairBatch& b, std::int32_t k) {
   return I::bits(I::negate(I::set(0.0) >= size));
 }
 
-template <class I, SceneTraits scene>
-PLATEN_INLINE ActiveVectors active_vectors(const Chunk<scene>& chunk, const PairBatch& b, double dt, std::int32_t start, int count) {
+// Which these are; `shortest` becomes the shortest lever of either side, a/R, if it was not before.
+template <class I, SceneTraits scene, bool guarded>
+PLATEN_INLINE ActiveVectors active_vectors(const Chunk<scene>& chunk, const PairBatch& b, double dt, std::int32_t start, int count,
+                                           typename SingleOf<I>::Type::Real& shortest) {
   using Real = typename I::Real;
   const Real zero = I::set(0.0);
   constexpr unsigned all = I::width < 32 ? (1u << I::width) - 1u : ~0u;
   ActiveVectors active;
   for (int at = 0; at < count; at += I::width) {
+    // Padding, whose lever is no number, leaves the second operand as it is.
+    if constexpr (guarded)
+      for (int side = 0; side < Chunk<scene>::sides; ++side) shortest = SingleOf<I>::min(I::load(chunk.lever[side] + at), shortest);
     const Real delta = I::load(chunk.delta + at), before = I::fma(I::load(chunk.v_n + at), I::set(dt), delta);
     unsigned lanes = I::bits(I::either(delta > zero, before > zero));
     if (2 * __builtin_popcount(lanes) > I::width)

@@ -19,6 +19,7 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
   Chunk<scene> chunk;
   GatheredPairs<typename Interleaved<I>::Type, scene> gathered;
   alignas(64) const double nothing[record_size] = {};
+  typename I::Real shortest_lever = I::set(1.0);
   for (std::int32_t start = 0; start < b.count; start += chunk_size) {
     const int count = start + chunk_size < b.count ? chunk_size : b.count - start;
     if (c.width > 0.0)
@@ -28,12 +29,18 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
       for (int at = 0; at < count; at += I::width)
         chunk.template put_pairs<I>(at, fetch_pairs<I, scene, exact, false>(b, c, start + at));
     using Wide = typename Interleaved<I>::Type;
-    ActiveVectors active = active_vectors<Wide, scene>(chunk, b, c.dt, start, count);
+    ActiveVectors active = active_vectors<Wide, scene, guarded>(chunk, b, c.dt, start, count, shortest_lever);
     const bool few = GatheredPairs<Wide, scene>::worth(active);
     if (few) gathered.take(chunk, b, start, active);
     const PairBatch seen = few ? gathered.view(b) : b;
     const std::int32_t first = few ? 0 : start;
     fine = law_of_chunk<Wide, scene, exact, guarded>(chunk, seen, c, first, active, totals) && fine;
+    // An overlap above R, the centre of one sphere deep inside the other, is no contact any more: a lever below 1/2.
+    // Forces are looked at only where overlaps let them be too large [docs/decisions.md, "Guards where overlaps are deep"].
+    if (guarded && I::any(shortest_lever < I::set(c.watched_lever))) {
+      fine = fine && !I::any(shortest_lever < I::set(0.5)) && !too_strong<Wide, scene>(chunk, active, c.force.bound);
+      shortest_lever = I::set(1.0);
+    }
     for (int m = 0; m < active.count; ++m)
       for (int at = active.at[m]; at < active.at[m] + Wide::width; at += I::width)
         output_pairs<I, scene>(chunk, at, seen, c, first + at, nothing, carried, owner);

@@ -15,41 +15,24 @@ struct PairEnergies {
   typename I::Real plastic, viscous, sliding, rolling, model;
 };
 
-// What a chunk shows of forces that are no forces. Tests of sums cost less than those of every contact; where a sum is
-// too large or not a number, `too_strong` looks at each.
-template <class I>
-struct Guards {
-  typename I::Real strength = I::set(0.0);        // sum of |Fx| + |Fy| + |Fz| + S, which is more than the root of |F|^2 + S^2 of any
-  typename I::Real lever_i = I::set(1.0), lever_j = I::set(1.0);  // the shortest
-};
-
 // Sums over the pairs of a chunk, on single vectors also where the law works on two at once.
-template <class I, bool guarded>
+template <class I>
 struct ChunkSums {
   using Sum = typename SingleOf<I>::Type;
   PairEnergies<Sum> energy = {Sum::set(0.0), Sum::set(0.0), Sum::set(0.0), Sum::set(0.0), Sum::set(0.0)};
-  Guards<Sum> guards;
   int contacts = 0;
 
   PLATEN_INLINE void add(typename Sum::Real PairEnergies<Sum>::*term, const typename I::Real& value, const LawConstants& c) {
     energy.*term = energy.*term + SingleOf<I>::sum(rounded<I>(value, c.energy));
-  }
-  PLATEN_INLINE void watch_force(const typename I::Real& size) {
-    if constexpr (guarded) guards.strength = guards.strength + SingleOf<I>::sum(size);
-  }
-  // Pairs that are apart have levers above 1, and padding, whose lever is no number, gives the second operand.
-  PLATEN_INLINE void watch_lever(int side, const typename I::Real& lever) {
-    typename Sum::Real& shortest = side == 0 ? guards.lever_i : guards.lever_j;
-    if constexpr (guarded) shortest = SingleOf<I>::min(lever, shortest);
   }
 };
 
 // Forces of `width` pairs from position `at` of a chunk on; reads and advances their history, adds their energies.
 // In an order that needs few numbers at a time: the tangential spring before its limit, the normal force and with it the
 // limit, the spring after it, dashpots, and what goes to each side.
-template <class I, SceneTraits scene, bool exact, bool guarded>
+template <class I, SceneTraits scene, bool exact>
 PLATEN_INLINE void pair_forces(Chunk<scene>& chunk, int at, const PairBatch& b, const LawConstants& c, std::int32_t k,
-                               ChunkSums<I, guarded>& sums) {
+                               ChunkSums<I>& sums) {
   static_assert(scene.rolling != Rolling::relative || !scene.equal_spheres, "relative rolling is built for unequal spheres only");
   using Real = typename I::Real;
   using Energy = PairEnergies<typename SingleOf<I>::Type>;
@@ -84,9 +67,8 @@ PLATEN_INLINE void pair_forces(Chunk<scene>& chunk, int at, const PairBatch& b, 
   }
   const Real f_n = normal.f_hys - beta_n * pairs.v_n();
   const Real strength = I::abs(normal.f_hys);
-  Real S_i = zero;
   if constexpr (scene.rolling == Rolling::absolute) {
-    S_i = I::where(touching, strength * pairs.lever(0), zero);
+    const Real S_i = I::where(touching, strength * pairs.lever(0), zero);
     I::store(chunk.S[0] + at, S_i);
     if constexpr (!scene.equal_spheres) I::store(chunk.S[1] + at, I::where(touching, strength * pairs.lever(1), zero));
   }
@@ -130,14 +112,11 @@ PLATEN_INLINE void pair_forces(Chunk<scene>& chunk, int at, const PairBatch& b, 
   const Vec3<I> n = pairs.n();
   const Vec3<I> F = where<I>(touching, add_scaled<I>(F_t, f_n, n), none);
   chunk.template put<I>(chunk.F, at, F);
-  sums.watch_force((I::abs(F.x) + I::abs(F.y)) + (I::abs(F.z) + S_i));
   const Vec3<I> turn = minus_cross(n, F_t);
   const Real lever_i = pairs.lever(0);
-  sums.watch_lever(0, lever_i);
   Vec3<I> T_i = where<I>(touching, scale<I>(lever_i, turn), none);
   if constexpr (!scene.equal_spheres) {
     const Real lever_j = pairs.lever(1);
-    sums.watch_lever(1, lever_j);
     Vec3<I> T_j = where<I>(touching, scale<I>(lever_j, turn), none);
     if constexpr (scene.rolling == Rolling::relative) {
       const Real R_i = pairs.R(0), R_j = pairs.R(1);
@@ -180,24 +159,16 @@ bool too_strong(const Chunk<scene>& chunk, const ActiveVectors& active, double b
   return strong;
 }
 
-// Law of a chunk; whether every contribution is a number within its bound. (Only benches leave the guards out, to see
-// what they cost.)
+// Law of a chunk; whether every energy is a number within its bound. (Only benches leave the guards out, to see what they
+// cost.)
 template <class I, SceneTraits scene, bool exact, bool guarded>
 PLATEN_INLINE bool law_of_chunk(Chunk<scene>& chunk, const PairBatch& b, const LawConstants& c, std::int32_t start,
                                 const ActiveVectors& active, PairTotals& totals) {
-  ChunkSums<I, guarded> sums;
+  ChunkSums<I> sums;
   for (int m = 0; m < active.count; ++m)
-    pair_forces<I, scene, exact, guarded>(chunk, active.at[m], b, c, start + active.at[m], sums);
+    pair_forces<I, scene, exact>(chunk, active.at[m], b, c, start + active.at[m], sums);
   using Sum = typename SingleOf<I>::Type;
   bool fine = true;
-  if constexpr (guarded) {
-    // An overlap above R, the centre of one sphere deep inside the other, is no contact any more: a lever below R/2.
-    const Guards<Sum>& guards = sums.guards;
-    auto deep = guards.lever_i < Sum::set(0.5);
-    if constexpr (!scene.equal_spheres) deep = Sum::either(deep, guards.lever_j < Sum::set(0.5));
-    const auto strong = Sum::negate(guards.strength < Sum::set(c.force.bound));
-    if (Sum::any(Sum::either(deep, strong))) fine = !Sum::any(deep) && !too_strong<I, scene>(chunk, active, c.force.bound);
-  }
   if constexpr (scene.energy) {
     double size = 0.0;
     for_each_energy<Sum, scene>(sums.energy, [&](int term, const typename Sum::Real& sum) {
@@ -206,7 +177,7 @@ PLATEN_INLINE bool law_of_chunk(Chunk<scene>& chunk, const PairBatch& b, const L
       totals.energy[term] += static_cast<std::int64_t>(total * c.energy.inverse);
     });
     // Beyond this bound sums are not exact. With forces within theirs a contact would have to move radii in one step, so
-    // that this is met by numbers that are none.
+    // that this is met by histories and speeds that are no numbers, or absurd ones.
     if constexpr (guarded) fine = fine && size < chunk_size / 2 * c.energy.bound;
   }
   totals.contacts += sums.contacts;

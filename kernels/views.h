@@ -55,6 +55,7 @@ struct LawConstants {
   double radius, inverse_radius;  // equal spheres
   double width, inverse_width, depth, inverse_depth;  // periodic lengths; all 0 where not periodic
   double rolling_share;      // relative rolling: largest part of the relative spin that one contact may take in a step
+  double watched_lever;      // forces of pairs with a shorter lever a/R are compared with their bound
   Quantum force, energy;
   double dt;                 // last drift; 0 when forces are evaluated without advancing springs
 };

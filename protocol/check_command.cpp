@@ -8,12 +8,9 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
-#include "core/particles.h"
 #include "kernels/kernel_table.h"
 #include "protocol/experiment.h"
 #include "protocol/progress.h"
-#include "protocol/stages/rain.h"
-#include "protocol/stages/random_source.h"
 #include "protocol/usable_cores.h"
 
 namespace platen {
@@ -23,12 +20,6 @@ constexpr double dense_porosity = 0.40;  // the bed that a plate presses [A34]
 
 // Measured: largest resident memory of dense beds of 8,000 and 97,000 spheres, contacts in the output [own runs].
 constexpr double bytes_of_program = 20e6, bytes_of_sphere = 1700.0;
-
-// A porosity that rain leaves, from own runs: 0.42 without adhesion, 0.49 where f0 is 200 times a sphere's weight; with
-// k_adh, contacts that were pressed by the fall stick too.
-double free_porosity(double bond, bool sticky) {
-  return std::clamp(0.42 + 0.013 * std::log1p(bond), sticky ? 0.50 : 0.42, 0.75);
-}
 
 std::string why_scene(const Case& c, bool equal) {
   const PairLaw& law = c.particles.law;
@@ -91,63 +82,6 @@ double total_wall(const std::vector<ExpectedStage>& stages) {
 }
 
 }  // namespace
-
-SphereFacts sphere_facts(const Case& c) {
-  const ParticleSpec& p = c.particles;
-  SphereFacts f;
-  f.mass_min = f.radius_min = std::numeric_limits<double>::infinity();
-  double radius_sum = 0.0;
-  const auto add = [&](double R, double rho, double times) {
-    const double m = sphere_mass(R, rho);
-    f.radius_min = std::min(f.radius_min, R), f.radius_max = std::max(f.radius_max, R);
-    f.mass_min = std::min(f.mass_min, m), f.mass_max = std::max(f.mass_max, m);
-    radius_sum += times * R, f.mass_total += times * m, f.solid_volume += times * sphere_mass(R, 1.0);
-  };
-  f.count = p.table ? static_cast<std::int64_t>(p.table->size()) : p.count;
-  if (p.table) {
-    for (std::size_t k = 0; k < p.table->size(); ++k) add(p.table->radius[k], p.table->density[k], 1.0);
-  } else if (p.sizes.kind == SizeDistribution::Kind::mono) {
-    add(p.sizes.radius, p.density, static_cast<double>(p.count));
-  } else {
-    // One at a time, as the fill draws them; a billion of them need no memory here.
-    RandomSource random(c.seed);
-    for (std::int64_t k = 0; k < p.count; ++k) add(draw_radius(p.sizes, random), p.density, 1.0);
-  }
-  f.radius_mean = radius_sum / static_cast<double>(f.count);
-  f.density = f.mass_total / f.solid_volume;
-  f.equal = f.radius_min == f.radius_max && f.mass_min == f.mass_max;
-  return f;
-}
-
-namespace {
-
-std::optional<double> bond_number(const Case& c, const SphereFacts& f) {
-  const double mean_mass = f.mass_total / static_cast<double>(f.count);
-  if (!(c.gravity > 0.0)) return std::nullopt;
-  return std::fabs(c.particles.law.f0) / (mean_mass * c.gravity);
-}
-
-// None without a box.
-std::optional<BedGuess> guess_bed(const Case& c, const SphereFacts& f) {
-  const double area = c.box.width * c.box.depth;
-  if (!(area > 0.0) || c.stages.empty()) return std::nullopt;
-  const StageSpec& start = c.stages.front();
-  BedGuess bed;
-  bed.porosity = start.kind == StageKind::fill && start.porosity ? *start.porosity
-                                                                 : free_porosity(bond_number(c, f).value_or(0.0), c.particles.law.k_adh > 0.0);
-  bed.height = f.solid_volume / (area * (1.0 - bed.porosity));
-  bed.rain_height = f.solid_volume / (area * rain_solid_fraction);
-  return bed;
-}
-
-}  // namespace
-
-double expected_particle_steps(const Case& c) {
-  const SphereFacts f = sphere_facts(c);
-  double sum = 0.0;
-  for (const ExpectedStage& s : expected_stages(c, guess_bed(c, f).value_or(BedGuess{}), f.count, first_step(c).dt, 1.0)) sum += s.wall;
-  return sum;
-}
 
 CheckReport check_report(const Case& c, int threads) {
   refuse_unstable_step(c);

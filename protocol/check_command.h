@@ -10,19 +10,9 @@
 #include "core/stability.h"
 #include "protocol/case_file.h"
 #include "protocol/expected_time.h"
+#include "protocol/sphere_facts.h"
 
 namespace platen {
-
-// The spheres of a case. Of a distribution these are the radii that the run draws with the case's seed.
-struct SphereFacts {
-  std::int64_t count = 0;
-  double radius_min = 0.0, radius_max = 0.0, radius_mean = 0.0;  // [m]
-  double density = 0.0;                                          // of all together [kg/m3]
-  double mass_min = 0.0, mass_max = 0.0, mass_total = 0.0;       // [kg]
-  double solid_volume = 0.0;                                     // [m3]
-  bool equal = true;                                             // one radius and one mass
-};
-SphereFacts sphere_facts(const Case& c);
 
 // I = (v/H) 2R sqrt(rho/sigma) of a stage that drives the top plate [A34].
 struct InertialNumber {
@@ -47,9 +37,6 @@ struct CheckReport {
   std::vector<ExpectedStage> stages;
   std::vector<std::string> notes;
 };
-
-// Of all stages, a guess; rain counts less per step than a dense bed.
-double expected_particle_steps(const Case& c);
 
 // Measures the speed of this machine for about 0.3 s. Throws CaseError for a time step that a run would refuse.
 CheckReport check_report(const Case& c, int threads);

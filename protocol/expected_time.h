@@ -1,10 +1,12 @@
 // How long a run will take on this machine: a short measurement of the engine, times a guess of what the stages do.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "protocol/case_file.h"
+#include "protocol/sphere_facts.h"
 
 namespace platen {
 
@@ -27,6 +29,9 @@ struct BedGuess {
   double porosity = 0.42;    // of the settled bed
 };
 
+// None without a box.
+std::optional<BedGuess> guess_bed(const Case& c, const SphereFacts& spheres);
+
 struct ExpectedStage {
   std::string name;
   StageKind kind = StageKind::run;
@@ -36,5 +41,8 @@ struct ExpectedStage {
 
 std::vector<ExpectedStage> expected_stages(const Case& c, const BedGuess& bed, std::int64_t count, double dt,
                                            double particle_steps_per_second);
+
+// Of all stages, a guess; rain counts less per step than a dense bed.
+double expected_particle_steps(const Case& c);
 
 }  // namespace platen

@@ -90,7 +90,8 @@ class Experiment {
     p.instruction_set = to_string(sim_->kernels().instruction_set);
     p.scene = built_scenes[static_cast<std::size_t>(sim_->kernels().scene)].name;
     p.particle_steps = sim_->step() * sim_->particles();
-    p.rebuilds = sim_->counters().rebuilds;
+    p.rebuilds = sim_->counters().rebuilds, p.prunes = sim_->counters().prunes;
+    p.redone_steps = sim_->counters().redone_steps;
     return p;
   }
 

@@ -55,7 +55,8 @@ struct Performance {
   std::string instruction_set, scene;
   std::int64_t particle_steps = 0;
   double wall_seconds = 0.0;
-  std::int64_t rebuilds = 0;
+  std::int64_t rebuilds = 0, prunes = 0;
+  std::int64_t redone_steps = 0;  // steps done twice because lists did not hold
 };
 
 }  // namespace platen

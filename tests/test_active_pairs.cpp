@@ -35,7 +35,10 @@ struct Sample {
     batch.sp = sp.data(), batch.tx = tx.data(), batch.ty = ty.data(), batch.tz = tz.data(), batch.k_t_last = k_t_last.data();
     batch.first = 100, batch.count = chunk_size;
   }
-  ActiveVectors active() const { return active_vectors<Two, scene>(chunk, batch, dt, 0, chunk_size); }
+  ActiveVectors active() const {
+    Scalar::Real shortest = 1.0;
+    return active_vectors<Two, scene, false>(chunk, batch, dt, 0, chunk_size, shortest);
+  }
 };
 
 TEST(ActivePairs, TouchingTouchedBeforeOrWithHistory) {

@@ -86,7 +86,9 @@ std::string summary_json(int exit_code, std::optional<std::uint64_t> state_hash,
              {"scene", performance.scene},
              {"particle_steps", performance.particle_steps},
              {"wall_seconds", performance.wall_seconds},
-             {"rebuilds", performance.rebuilds}};
+             {"rebuilds", performance.rebuilds},
+             {"prunes", performance.prunes},
+             {"redone_steps", performance.redone_steps}};
   set(figures, "particle_steps_per_second", rate(performance.particle_steps, performance.wall_seconds));
   return summary.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
 }

@@ -12,7 +12,7 @@
 #include "core/simulation.h"
 #include "protocol/case_document.h"
 #include "protocol/case_reader.h"
-#include "protocol/check_command.h"
+#include "protocol/expected_time.h"
 #include "protocol/experiment.h"
 #include "protocol/study/porosity_match.h"
 

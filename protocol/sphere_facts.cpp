@@ -1,0 +1,45 @@
+#include "protocol/sphere_facts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/particles.h"
+#include "protocol/stages/random_source.h"
+
+namespace platen {
+
+SphereFacts sphere_facts(const Case& c) {
+  const ParticleSpec& p = c.particles;
+  SphereFacts f;
+  f.mass_min = f.radius_min = std::numeric_limits<double>::infinity();
+  double radius_sum = 0.0;
+  const auto add = [&](double R, double rho, double times) {
+    const double m = sphere_mass(R, rho);
+    f.radius_min = std::min(f.radius_min, R), f.radius_max = std::max(f.radius_max, R);
+    f.mass_min = std::min(f.mass_min, m), f.mass_max = std::max(f.mass_max, m);
+    radius_sum += times * R, f.mass_total += times * m, f.solid_volume += times * sphere_mass(R, 1.0);
+  };
+  f.count = p.table ? static_cast<std::int64_t>(p.table->size()) : p.count;
+  if (p.table) {
+    for (std::size_t k = 0; k < p.table->size(); ++k) add(p.table->radius[k], p.table->density[k], 1.0);
+  } else if (p.sizes.kind == SizeDistribution::Kind::mono) {
+    add(p.sizes.radius, p.density, static_cast<double>(p.count));
+  } else {
+    // One at a time, as the fill draws them; a billion of them need no memory here.
+    RandomSource random(c.seed);
+    for (std::int64_t k = 0; k < p.count; ++k) add(draw_radius(p.sizes, random), p.density, 1.0);
+  }
+  f.radius_mean = radius_sum / static_cast<double>(f.count);
+  f.density = f.mass_total / f.solid_volume;
+  f.equal = f.radius_min == f.radius_max && f.mass_min == f.mass_max;
+  return f;
+}
+
+std::optional<double> bond_number(const Case& c, const SphereFacts& spheres) {
+  const double mean_mass = spheres.mass_total / static_cast<double>(spheres.count);
+  if (!(c.gravity > 0.0)) return std::nullopt;
+  return std::fabs(c.particles.law.f0) / (mean_mass * c.gravity);
+}
+
+}  // namespace platen
