@@ -49,9 +49,12 @@ std::int64_t scalar_forces(const ScalarBed& bed, const ScalarConstants& c, doubl
       const double wx = lever * (a.u[0] + b.u[0]), wy = lever * (a.u[1] + b.u[1]), wz = lever * (a.u[2] + b.u[2]);
       const double vx = a.v[0] - b.v[0], vy = a.v[1] - b.v[1], vz = a.v[2] - b.v[2];
       const double v_n = vx * nx + vy * ny + vz * nz;
-      const double tx = vx - v_n * nx + (ny * wz - nz * wy);
-      const double ty = vy - v_n * ny + (nz * wx - nx * wz);
-      const double tz = vz - v_n * nz + (nx * wy - ny * wx);
+      const double ax = vx - v_n * nx, ay = vy - v_n * ny, az = vz - v_n * nz;
+      const double lag = 0.5 * dt * inverse * (wx * nx + wy * ny + wz * nz);
+      const double qx = wx + lag * ax, qy = wy + lag * ay, qz = wz + lag * az;
+      const double tx = ax + (ny * qz - nz * qy);
+      const double ty = ay + (nz * qx - nx * qz);
+      const double tz = az + (nx * qy - ny * qx);
 
       // normal [Eq. 2]
       const double sp_old = h.sp;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "core/snapshot.h"
@@ -33,7 +34,7 @@ struct Measures {
   double height = 0.0;                // gap between the plates, highest sphere before touch [m]
   double stress_top = 0.0;            // [Pa], compression positive
   double stress_bottom = 0.0;         // [Pa]
-  double porosity = 0.0;              // [-]
+  double porosity = std::numeric_limits<double>::quiet_NaN();  // [-]; none where no sides keep the bed in its box
   double coordination_number = 0.0;   // 2 N_c / N
   std::int64_t contacts = 0;          // touching sphere pairs
   double kinetic_energy = 0.0;        // with rotation [J]

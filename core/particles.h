@@ -18,7 +18,7 @@ struct Particles {
   AlignedArray<double> vx, vy, vz;  // half-step velocity [m/s]
   AlignedArray<double> ux, uy, uz;  // R omega at the half step [m/s]
   AlignedArray<double> radius, inverse_radius, mass, inverse_mass;  // [m, 1/m, kg, 1/kg]; empty where equal
-  AlignedArray<double> rows;        // copies in the shape that contacts fetch, kernels/views.h
+  AlignedArray<double> rows;        // copies in the shape that contacts fetch, kernels/views.h; a run that is redone starts from them
   double common_radius = 0.0, common_mass = 0.0;
 
   // What it does not.

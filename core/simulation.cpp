@@ -141,8 +141,9 @@ void Simulation::setup_laws(const SimulationSetup& setup) {
   c.force = {1.5 * 0x1p52 * (F * most * 0x1p-53), F, 1.0 / (F * most * 0x1p-53)};
   const double E = power_of_two_above(F * R), q = E * chunk_size * 0x1p-53;
   c.energy = {1.5 * 0x1p52 * q, E, 1.0 / q};
-  // A force beyond its bound takes an overlap above R/2, a lever below 3/4; a friction above 1 may give one at any overlap.
-  c.watched_lever = c.mu > 1.0 ? 2.0 : 0.75;
+  // Forces are compared with F where overlaps are above R/2, a lever of 3/4. At smaller ones springs give less than 2.3 F,
+  // which sums still hold exactly, unless friction is above 1 or dashpots are stiffest at the smallest overlaps.
+  c.watched_lever = c.mu > 1.0 || n < 1.0 ? 2.0 : 0.75;
   energy_unit_ = E * 0x1p-60;
 
   PlateConstants& p = plate_law_;
@@ -162,6 +163,11 @@ void Simulation::setup_laws(const SimulationSetup& setup) {
   motion_.radius = particles_.common_radius, motion_.inverse_radius = 1.0 / particles_.common_radius;
   motion_.width = domain_.width, motion_.depth = domain_.depth;
   motion_.energy = c.energy;
+}
+
+bool Simulation::confined() const {
+  const auto present = [this](int plate) { return planes_[static_cast<std::size_t>(plate)].present; };
+  return periodic() || (present(wall_x_low) && present(wall_x_high) && present(wall_y_low) && present(wall_y_high));
 }
 
 double Simulation::time() const { return time_base_ + static_cast<double>(step_ - step_base_) * dt_; }
@@ -253,6 +259,29 @@ void Simulation::integrate(Batch& b, const MotionConstants& c) {
   b.path += std::sqrt(totals.largest_pace) * c.drift;
   b.rolling += totals.rolling;
   b.out_of_range = b.out_of_range || totals.out_of_range;
+  // Pairs far faster than R omega give more than sums hold exactly before they overlap deeply: it shows in a sphere's sum.
+  const double most = 4.0 * law_.force.bound;
+  if (!(totals.strongest < most * most)) b.out_of_range = b.out_of_range || !pairs_within(b, most);
+}
+
+// Whether pairs push every sphere of a batch with less than `most` [N]; plates and walls may push harder.
+bool Simulation::pairs_within(const Batch& b, double most) const {
+  AlignedArray<double> by_plates;
+  by_plates.assign(3 * static_cast<std::size_t>(b.count), 0.0);
+  for (const PlateList& list : b.plates)
+    for (std::size_t m = 0; m < static_cast<std::size_t>(list.used); ++m)
+      if (list.overlap[m] > 0.0)
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          by_plates[3 * static_cast<std::size_t>(list.particle[m] - b.first) + axis] += list.records[record_size * m + axis];
+  for (std::size_t k = 0; k < static_cast<std::size_t>(b.count); ++k) {
+    double size2 = 0.0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double f = b.sum[record_size * k + axis] - by_plates[3 * k + axis];
+      size2 += f * f;
+    }
+    if (!(size2 < most * most)) return false;
+  }
+  return true;
 }
 
 void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law, bool put_aside) {
@@ -297,10 +326,8 @@ void Simulation::ensure_forces() {
   if (!lists_valid_) rebuild();
   if (forces_valid_) return;
   const FloatMode mode;
-  LawConstants law = law_;
-  PlateConstants plate_law = plate_law_;
-  law.dt = plate_law.dt = 0.0;
-  parallel(static_cast<int>(batches_.size()), [&](int k) { contacts(batches_[static_cast<std::size_t>(k)], step_, law, plate_law, false); });
+  law_.dt = plate_law_.dt = 0.0;
+  parallel(static_cast<int>(batches_.size()), [&](int k) { contacts(batches_[static_cast<std::size_t>(k)], step_, law_, plate_law_, false); });
   collect();
   forces_valid_ = true;
   bool bad = false;

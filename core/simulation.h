@@ -96,6 +96,8 @@ class Simulation {
   // Takes the periodic sides away: pairs across a face are deleted, every sphere stays where it is [A32].
   void open_sides();
   bool periodic() const { return domain_.width > 0.0; }
+  // Whether sides, periodic ones or walls, keep the bed in its box, so that area times height is its volume.
+  bool confined() const;
 
   void advance(std::int64_t steps);
 
@@ -140,6 +142,7 @@ class Simulation {
   void setup_laws(const SimulationSetup& setup);
   void merge(Batch& batch);
   void integrate(Batch& batch, const MotionConstants& c);
+  bool pairs_within(const Batch& batch, double most) const;
   void contacts(Batch& batch, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law, bool put_aside);
   void run_task(const Task& task);
   void collect();

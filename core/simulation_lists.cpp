@@ -313,7 +313,6 @@ void Simulation::open_sides() {
 void Simulation::save() {
   Saved& s = *saved_;
   s.rows.resize(particles_.rows.size());
-  s.rows.swap(particles_.rows);
   s.image.resize(particles_.image.size());
   s.batches.resize(batches_.size());
   merge_all();
@@ -327,6 +326,7 @@ void Simulation::save() {
     to.sums.resize(b.sum.size());
     to.contacts = b.pair_totals.contacts;
   });
+  s.rows.swap(particles_.rows);  // last, so that nothing is lost where memory runs out
 }
 
 void Simulation::restore() {

@@ -192,7 +192,7 @@ Measures Simulation::measure(bool stored_energies) {
   r.support_force = all.support.value();
   if (area() > 0.0) {
     r.stress_top = all.top.value() / area(), r.stress_bottom = all.bottom.value() / area();
-    r.porosity = 1.0 - solid_volume_ / (area() * r.height);
+    if (confined()) r.porosity = 1.0 - solid_volume_ / (area() * r.height);
   }
   r.contacts = contacts_;
   r.coordination_number = particles_.count > 0 ? 2.0 * static_cast<double>(contacts_) / particles_.count : 0.0;
@@ -289,12 +289,14 @@ Snapshot Simulation::snapshot(bool with_contacts) {
     // Forces saw the velocities of the half step before.
     const double l_i = 1.0 - 0.5 * s.delta / s.R_i, l_j = 1.0 - 0.5 * s.delta / s.R_j;
     const double v[3] = {p.vx[a] - p.vx[d], p.vy[a] - p.vy[d], p.vz[a] - p.vz[d]};
-    const double w[3] = {l_i * p.ux[a] + l_j * p.ux[d], l_i * p.uy[a] + l_j * p.uy[d], l_i * p.uz[a] + l_j * p.uz[d]};
+    double w[3] = {l_i * p.ux[a] + l_j * p.ux[d], l_i * p.uy[a] + l_j * p.uy[d], l_i * p.uz[a] + l_j * p.uz[d]};
     const double* n3 = s.n;
     const double v_n = v[0] * n3[0] + v[1] * n3[1] + v[2] * n3[2];
-    const double v_t[3] = {v[0] - v_n * n3[0] + n3[1] * w[2] - n3[2] * w[1],
-                           v[1] - v_n * n3[1] + n3[2] * w[0] - n3[0] * w[2],
-                           v[2] - v_n * n3[2] + n3[0] * w[1] - n3[1] * w[0]};
+    const double across[3] = {v[0] - v_n * n3[0], v[1] - v_n * n3[1], v[2] - v_n * n3[2]};
+    const double lag = 0.5 * law_.dt / (s.R_i + s.R_j - s.delta) * (w[0] * n3[0] + w[1] * n3[1] + w[2] * n3[2]);
+    for (int axis = 0; axis < 3; ++axis) w[axis] += lag * across[axis];
+    const double v_t[3] = {across[0] + n3[1] * w[2] - n3[2] * w[1], across[1] + n3[2] * w[0] - n3[0] * w[2],
+                           across[2] + n3[0] * w[1] - n3[1] * w[0]};
     const double T[3] = {sign * b.tx[k], sign * b.ty[k], sign * b.tz[k]};
     const double size = std::sqrt(T[0] * T[0] + T[1] * T[1] + T[2] * T[2]);
     const bool cut = size >= limit * (1.0 - 1e-12);

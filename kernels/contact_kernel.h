@@ -38,7 +38,7 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
     // An overlap above R, the centre of one sphere deep inside the other, is no contact any more: a lever below 1/2.
     // Forces are looked at only where overlaps let them be too large [docs/decisions.md, "Guards where overlaps are deep"].
     if (guarded && I::any(shortest_lever < I::set(c.watched_lever))) {
-      fine = fine && !I::any(shortest_lever < I::set(0.5)) && !too_strong<Wide, scene>(chunk, active, c.force.bound);
+      fine = fine && !I::any(shortest_lever < I::set(0.5)) && !too_strong<Wide, scene>(chunk, active, c.force.bound, c.watched_lever);
       shortest_lever = I::set(1.0);
     }
     for (int m = 0; m < active.count; ++m)

@@ -114,7 +114,9 @@ template <class I, bool exact>
 PLATEN_INLINE LimitedSpring<I> limited_spring(const TrialSpring<I>& trial, typename I::Real limit) {
   using Real = typename I::Real;
   const Real limit2 = limit * limit;
-  const auto cut = trial.size2 >= limit2;  // also where both are 0: no dashpot on a frictionless contact
+  // Also where both are 0 (no dashpot on a frictionless contact), and where a spring is no number: its loss is none then,
+  // which the sum of energies shows.
+  const auto cut = I::not_less(trial.size2, limit2);
   const Real back = I::where(cut, limit * inverse_sqrt<I, exact>(I::max(trial.size2, I::set(0x1p-900))), I::set(1.0));
   // Work of the mean of the old and the new spring over the slip that did not stretch it: (T_old + T)(T_trial - T).
   const Real over = I::set(1.0) - back;

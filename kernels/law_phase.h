@@ -143,18 +143,22 @@ PLATEN_INLINE void for_each_energy(const PairEnergies<I>& energy, const Visit& v
   if constexpr (scene.exponent != Exponent::one) visit(term_model, energy.model);
 }
 
-// Whether a contact of the chunk is out of its bound [N]. Written so that a NaN counts as too strong.
+// Whether a contact of the chunk whose lever on either side is below `watched` is out of its bound [N]. Each contact is
+// judged by itself, so that what else its chunk holds does not matter. Written so that a NaN counts as too strong.
 template <class I, SceneTraits scene>
-bool too_strong(const Chunk<scene>& chunk, const ActiveVectors& active, double bound) {
+bool too_strong(const Chunk<scene>& chunk, const ActiveVectors& active, double bound, double watched) {
   bool strong = false;
   for (int m = 0; m < active.count; ++m) {
-    const Vec3<I> F = Chunk<scene>::template take<I>(chunk.F, active.at[m]);
-    typename I::Real strength2 = dot(F, F);
+    const int at = active.at[m];
+    const Vec3<I> F = Chunk<scene>::template take<I>(chunk.F, at);
+    typename I::Real strength2 = dot(F, F), shortest = I::load(chunk.lever[0] + at);
     if constexpr (scene.rolling == Rolling::absolute) {
-      const typename I::Real S = I::load(chunk.S[0] + active.at[m]);
+      const typename I::Real S = I::load(chunk.S[0] + at);
       strength2 = I::fma(S, S, strength2);
     }
-    strong = strong || I::any(I::negate(strength2 < I::set(bound * bound)));
+    if constexpr (!scene.equal_spheres) shortest = I::min(I::load(chunk.lever[1] + at), shortest);
+    const auto within = strength2 < I::set(bound * bound);
+    strong = strong || I::any(I::both(shortest < I::set(watched), I::negate(within)));
   }
   return strong;
 }

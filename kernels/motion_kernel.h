@@ -15,7 +15,8 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
   const Real zero = I::set(0.0), kick = I::set(c.kick), drift = I::set(c.drift);
   Real largest = zero;
   Real rolled = zero;
-  Real squares = zero;  // of all velocities: not a number where one is none. Spins show in the forces that they cause
+  Real squares = zero;    // of all velocities: not a number where one is none. Spins show in the contacts that they rub
+  Real strongest = zero;  // largest force on a sphere, squared
   for (std::int32_t k = 0; k < b.count; k += I::width) {
     typename I::Record records[I::width];
     for (int lane = 0; lane < I::width; ++lane)
@@ -76,11 +77,15 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
     const Vec3<I> excess = {v.x - I::set(c.mean_x), v.y - I::set(c.mean_y), v.z - I::set(c.mean_z)};
     const Real speed2 = dot(excess, excess);
     largest = I::max(largest, speed2 * I::load(b.inverse_room2 + k));
-    if constexpr (guarded) squares = squares + speed2;
+    if constexpr (guarded) {
+      squares = squares + speed2;
+      strongest = I::max(strongest, I::fma(f[2], f[2], I::fma(f[1], f[1], f[0] * f[0])));
+    }
   }
   const double pace = I::largest(largest);
   totals.largest_pace = totals.largest_pace > pace ? totals.largest_pace : pace;
-  if constexpr (guarded) totals.out_of_range = totals.out_of_range || I::any(I::negate(squares < I::set(0x1p60)));
+  if constexpr (guarded) totals.out_of_range = totals.out_of_range || I::any(I::not_less(squares, I::set(0x1p60)));
+  if constexpr (guarded) totals.strongest = I::largest(strongest);
   if constexpr (energy && rolling) {
     const double total = I::sum(rolled);
     // Beyond this bound the sum is not exact.

@@ -58,6 +58,7 @@ struct Twice {
   static PLATEN_INLINE Mask both(const Mask& x, const Mask& y) { return {I::both(x.a, y.a), I::both(x.b, y.b)}; }
   static PLATEN_INLINE Mask either(const Mask& x, const Mask& y) { return {I::either(x.a, y.a), I::either(x.b, y.b)}; }
   static PLATEN_INLINE Mask negate(const Mask& x) { return {I::negate(x.a), I::negate(x.b)}; }
+  static PLATEN_INLINE Mask not_less(const Real& x, const Real& y) { return {I::not_less(x.a, y.a), I::not_less(x.b, y.b)}; }
   static PLATEN_INLINE Real fast_inverse_sqrt(const Real& x) {
     return {I::fast_inverse_sqrt(x.a), I::fast_inverse_sqrt(x.b)};
   }

@@ -27,7 +27,7 @@ inline constexpr int pair_padding = 16;  // contacts to what a kernel takes at o
 // as they stay below 2^53 q, hence the same in any order.
 struct Quantum {
   double magic = 0.0;
-  double bound = 0.0;    // contributions must stay below this
+  double bound = 0.0;    // credible contributions are below this; up to 4 times as much is rounded exactly
   double inverse = 0.0;  // 1/q
 };
 
@@ -81,7 +81,7 @@ struct PairBatch {
 struct PairTotals {
   std::int64_t contacts = 0;               // touching
   std::int64_t energy[term_count] = {};    // quanta
-  bool out_of_range = false;               // a contribution reached its bound, or is not a number
+  bool out_of_range = false;               // an overlap, a force of a deep overlap or an energy beyond its bound, or no number
 };
 
 // One plane: a plate or a wall, its outward normal along an axis.
@@ -144,6 +144,7 @@ struct MotionBatch {
 
 struct MotionTotals {
   double largest_pace = 0.0;     // of |v - mean|^2 / room^2 [1/s2]
+  double strongest = 0.0;        // largest force on a sphere, squared [N2]
   std::int64_t rolling = 0;      // rolling dissipation, quanta
   bool out_of_range = false;     // a velocity is not finite or absurd
 };

@@ -81,6 +81,8 @@ Case parse_case(const std::string& text, const std::string& name, const std::fil
   facts.use = use;
   facts.folder = folder;
   facts.file = {name, 1, 1};
+  if (const CaseEntry* study = document.find("study"))
+    throw CaseError(to_string(study->where) + ": [study]: this is a study, not a case; use `platen study`, or its `base` as the case");
   TableReader root(&document, "", facts.file, problems);
   read_sections(root, c, facts, problems);
   check_case(c, facts, problems);

@@ -65,6 +65,16 @@ void add_notes(const Case& c, CheckReport& report) {
     report.notes.push_back("exponent > 1: stiffness grows with the overlap; the first time step assumes overlaps of R/10");
   if (c.time.step && report.limits.dt_limit < *c.time.step)
     report.notes.push_back("time.step is above dt_limit of a dense bed; the run goes on because of time.allow_unstable");
+  // Plates are stiffer than pairs by a factor that depends on how hard they press: two was seen at 40 kPa.
+  if (c.time.step && !c.time.allow_unstable && (c.plates.top || c.plates.bottom) && *c.time.step > 0.45 * report.limits.dt_limit)
+    report.notes.push_back("time.step is near dt_limit of a bed without plates; spheres at a plate may have half of it, and a run looks at its own bed");
+  for (std::size_t k = 0; k < report.stages.size(); ++k)
+    if (const ExpectedStage& e = report.stages[k]; e.needed > e.simulated * (1.0 + 1e-9))
+      report.notes.push_back(fmt::format("{}: needs about {:.3g} s; max_duration = {:.3g} s ends the run before that (exit code {})", e.name, e.needed,
+                                         e.simulated, static_cast<int>(exit_goal)));
+  const auto wants_frames = [](const StageSpec& stage) { return stage.frames.value_or(0.0) > 0.0; };
+  if (c.output.frames || std::any_of(c.stages.begin(), c.stages.end(), wants_frames))
+    report.notes.push_back("output.frames: this version does not write frames yet");
   for (const InertialNumber& i : report.inertial)
     if (i.value > 1e-3)
       report.notes.push_back(fmt::format("{}: inertial number {:.1e} at {:.3g} Pa ({}): not quasi-static there (below 1e-4 it is)",

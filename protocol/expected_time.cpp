@@ -114,7 +114,7 @@ std::vector<ExpectedStage> expected_stages(const Case& c, const BedGuess& bed, s
   double height = bed.height, plate = std::max(c.box.height, bed.height);
   std::vector<ExpectedStage> stages;
   for (const StageSpec& s : c.stages) {
-    ExpectedStage e{s.name, s.kind, 0.0, 0.0};
+    ExpectedStage e{s.name, s.kind, 0.0, 0.0, 0.0};
     double cost = 1.0;
     // How far the plate goes until the strain that ends the stage, through empty space first.
     const auto press = [&](double strain) {
@@ -145,6 +145,7 @@ std::vector<ExpectedStage> expected_stages(const Case& c, const BedGuess& bed, s
       case StageKind::run: e.simulated = s.duration.value_or(0.0); break;
     }
     if (s.until.duration) e.simulated = std::min(e.simulated, *s.until.duration);
+    e.needed = e.simulated;
     e.simulated = std::min(e.simulated, s.max_duration);
     e.wall = cost * e.simulated / dt * static_cast<double>(count) / particle_steps_per_second;
     stages.push_back(e);

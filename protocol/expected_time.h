@@ -36,6 +36,7 @@ struct ExpectedStage {
   std::string name;
   StageKind kind = StageKind::run;
   double simulated = 0.0;  // [s]
+  double needed = 0.0;     // the same if it had all the time that it needs: more than max_duration is a goal missed [s]
   double wall = 0.0;       // [s]
 };
 

@@ -157,9 +157,12 @@ class Experiment {
       folder_.log("limits", {{"step", sim_->step()}, {"dt", sim_->time_step()}, {"dt_crit", limits.dt_crit}, {"dt_pairs", limits.dt_pairs}, {"dt_limit", limits.dt_limit}});
     if (c_.time.step) {
       const double ratio = sim_->time_step() / limits.dt_limit;
-      if (ratio > 1.0 && !c_.time.allow_unstable)
-        throw RunError(fmt::format("the time step {:.4g} s is above dt_limit = {:.4g} s of the bed at step {}; use a smaller time.step or \"auto\"",
-                                   sim_->time_step(), limits.dt_limit, sim_->step()));
+      if (ratio > 1.0 && !c_.time.allow_unstable) {
+        std::string ruled_by;
+        sim_->step_limits(ruled_by);
+        throw RunError(fmt::format("the time step {:.4g} s is above dt_limit = {:.4g} s of the bed at step {} (ruled by {}); use a smaller time.step or \"auto\"",
+                                   sim_->time_step(), limits.dt_limit, sim_->step(), ruled_by));
+      }
       if (ratio > 0.9) warn(ratio > 1.0 ? "time step above dt_limit" : "time step above 0.9 dt_limit");
       return;
     }
@@ -240,6 +243,8 @@ class Experiment {
         over = true, end = End::goal_missed;
         current_.reached = false;
         current_.end_reason = fmt::format("goal not reached within max_duration = {:.4g} s", spec.max_duration);
+        const std::string missing = what_is_missing(stand, sim_->measure(false));
+        if (!missing.empty()) current_.end_reason += ": " + missing;
       }
       if (!over) {
         if (const auto why = stop_request()) over = true, end = End::stopped, current_.end_reason = *why, current_.reached = false;
@@ -274,8 +279,11 @@ class Experiment {
     current_.wall_seconds = now() - stage_begin;
     current_.strain_zero_height = strain_zero_height_;
     const Snapshot snapshot = sim_->snapshot();
-    if (sim_->area() > 0.0 && snapshot.z_top > snapshot.z_bottom) current_.bed = bed_stress(snapshot, c_.box.width, c_.box.depth);
-    const Profile heights = sim_->area() > 0.0 ? profile(snapshot, sim_->area(), c_.output.slabs) : Profile{};
+    // Without sides a bed has no volume that could be told from its height.
+    const bool confined = sim_->area() > 0.0 && sim_->confined();
+    if (confined && snapshot.z_top > snapshot.z_bottom) current_.bed = bed_stress(snapshot, c_.box.width, c_.box.depth);
+    const double area = confined ? sim_->area() : std::numeric_limits<double>::quiet_NaN();
+    const Profile heights = sim_->area() > 0.0 ? profile(snapshot, area, c_.output.slabs) : Profile{};
     if (end != End::stopped) {
       const StepLimits limits = sim_->step_limits(current_.time_step.ruled_by);
       current_.time_step.dt_crit = std::min(current_.time_step.dt_crit, limits.dt_crit);

@@ -201,6 +201,8 @@ std::string describe(const fs::path& path, bool json) {
   if (!fs::exists(path, ignored)) throw OutputError(path.string() + ": no such file or folder");
   if (fs::is_directory(path)) {
     if (fs::exists(path / "case.toml") && fs::exists(path / "series.csv")) return describe_run(path, json);
+    if (fs::exists(path / "study.toml") && fs::exists(path / "runs.csv"))
+      throw OutputError(path.string() + ": is the folder of a study; its tables are runs.csv and tables/*.csv, its runs are in runs/");
     throw OutputError(path.string() + ": is not a run folder");
   }
   if (Hdf5File::is_hdf5(path)) return describe_hdf5(path, json);

@@ -106,6 +106,7 @@ int run_command(const RunCommand& command) {
   } else if (!command.quiet) {
     print(summary_table(outcome.stages));
     print(fmt::format("results: {} (results.h5, series.csv, summary.json)\n", path.string()));
+    if (outcome.exit_code == exit_done) print(fmt::format("state hash: {:016x}\n", outcome.state_hash));
   }
   report_end(outcome, path, command.quiet);
   return outcome.exit_code;

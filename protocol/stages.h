@@ -46,6 +46,9 @@ struct Look {
   double strain = std::numeric_limits<double>::quiet_NaN();
 };
 
+// What the goals of a stage are and where the bed stands: "stress 5.1 kPa of 40 kPa"; "" for a stage that ends by time.
+std::string what_is_missing(const Stand& stand, const Measures& m);
+
 // A stage that waits for rest: settle and release [A27].
 class RestWatch {
  public:

@@ -173,6 +173,9 @@ int study_command(const StudyCommand& command) {
     print(fmt::format("results: {} (study.h5, statements.md, runs.csv, runs/, {})\n", command.folder.string(),
                       study.parts.empty() ? "tables/, figures/" : "tables/ and figures/ in a folder for each part"));
   }
+  const auto warned = std::count_if(outcomes.begin(), outcomes.end(), [](const JobOutcome& o) { return o.state != JobState::failed && !o.message.empty(); });
+  if (warned > 0 && !command.quiet)
+    spdlog::warn("{} of {} runs have warnings: column message of {}", warned, plan.jobs.size(), (command.folder / "runs.csv").string());
   const int failed = exit_code_of(outcomes), code = failed == exit_done && !damaged.empty() ? exit_io : failed;
   if (failed != exit_done)
     spdlog::error("{} of {} runs failed: {}",

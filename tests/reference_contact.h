@@ -157,8 +157,10 @@ inline EepaForces eepa_contact(const EepaLaw& law, EepaContact& c, const Body& i
   r.a_i = i.R - delta / 2.0;  // centre to contact point [A18]
   r.a_j = j.R - delta / 2.0;
   const Vec3 v = i.v - j.v;
-  const Vec3 v_c = v - cross(r.a_i * i.w + r.a_j * j.w, n);
-  const Vec3 v_t = v_c - dot(v_c, n) * n;
+  // The normal of half a step ago, to which the velocities belong, is n - dt/2 dn/dt; the tangent plane is the present one.
+  const Vec3 across = v - dot(v, n) * n, spins = r.a_i * i.w + r.a_j * j.w;
+  const Vec3 turned = spins + (0.5 * dt / distance) * dot(spins, n) * across;
+  const Vec3 v_t = across - cross(turned, n);
   const double rate = -dot(v, n);  // d(delta)/dt
 
   // Eq. 3, 4 and A8: K1 is the tangent stiffness of the loading branch, K1 = k1 at n = 1.

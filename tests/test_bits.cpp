@@ -68,11 +68,11 @@ EngineOptions options(InstructionSet set, bool reproducible, int scene) {
 // Of --reproducible runs after 300 steps. A scene with an exponent of its own calls pow, whose last bit is the
 // business of the C library and the processor, so it has no entry. PLATEN_PRINT_GOLDEN=1 prints the table.
 const std::map<std::string, std::uint64_t> golden = {
-    {"elastic", 0x5e54a4b1fc48ec55ULL},
-    {"cohesionless", 0xc20e9f4dfba9e26aULL},
-    {"full", 0xdcdfb6dfdbe8836fULL},
-    {"full_wide", 0x34abb5e8daa70ef4ULL},
-    {"three_halves", 0xa1a939eef6ae771fULL},
+    {"elastic", 0x2be982bfaa81920bULL},
+    {"cohesionless", 0x7ae669e0987d271fULL},
+    {"full", 0x147a6c931a0783c0ULL},
+    {"full_wide", 0xad14137dc897d1b7ULL},
+    {"three_halves", 0xee289acb4c545803ULL},
 };
 
 TEST(Bits, ReproducibleIsTheSameOnEveryInstructionSet) {

@@ -183,5 +183,17 @@ duration = "1 ms"
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 2) << "check writes nothing";
 }
 
+TEST(CheckCommand, AStageThatItsTimeDoesNotSufficeForHasANote) {
+  const auto notes = [](const std::vector<std::string>& overrides) {
+    std::string all;
+    for (const std::string& note : check_report(good(overrides), 1).notes) all += note + "\n";
+    return all;
+  };
+  EXPECT_EQ(notes({}).find("max_duration"), std::string::npos) << notes({});
+  const std::string slow = notes({"stage.compress.speed=\"0.01 mm/s\""});
+  EXPECT_NE(slow.find("compress: needs about "), std::string::npos) << slow;
+  EXPECT_NE(slow.find("max_duration = 60 s ends the run before that (exit code 6)"), std::string::npos) << slow;
+}
+
 }  // namespace
 }  // namespace platen::test

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "kernels/law_phase.h"
 #include "tests/experiment_case.h"
 #include "tests/scenes.h"
 
@@ -17,9 +18,9 @@ constexpr double inf = std::numeric_limits<double>::infinity(), nan = std::numer
 // What the engine says when `fault` has been put into a bed at step 20; "" where it goes on as if nothing were wrong.
 // A running Simulation cannot be written to from outside; only this test does so.
 template <class Fault>
-std::string said_after(InstructionSet set, int threads, const Fault& fault, const PairLaw& law = scenes::full_law()) {
+std::string said_after(InstructionSet set, int threads, const Fault& fault, const PairLaw& law = scenes::full_law(), bool energy = true) {
   EngineOptions engine;
-  engine.instruction_set = set, engine.threads = threads, engine.batch = 16;
+  engine.instruction_set = set, engine.threads = threads, engine.batch = 16, engine.energy = energy;
   scenes::BedOptions options;
   Simulation sim(scenes::bed(options, law, engine));
   sim.set_time_step(2e-6);
@@ -112,6 +113,64 @@ TEST(Guards, OverlapsAboveR) {
     EXPECT_NE(said.find("; spheres "), std::string::npos) << said;
     for (const char* what : {" overlap by 1.", " R (plastic ", "approach at ", "push with ", "a smaller time step"}) EXPECT_NE(said.find(what), std::string::npos) << said;
   }
+}
+
+// With ordinary friction the limit makes an end of any spring, but not of one that is no number; with the ledger off no
+// energy shows it.
+TEST(Guards, AHistoryThatIsNoNumber) {
+  for (const InstructionSet set : available_instruction_sets())
+    for (const bool energy : {true, false}) {
+      const std::string said = said_after(set, 1, [&](Particles&, std::vector<Batch>& batches, std::size_t k) {
+        for (Batch& b : batches)
+          for (std::size_t m = 0; m < static_cast<std::size_t>(b.used); ++m)
+            if (static_cast<std::size_t>(b.i[m]) == k || static_cast<std::size_t>(b.j[m]) == k) b.tx[m] = nan;
+      }, scenes::full_law(), energy);
+      EXPECT_NE(said.find(energy ? "out of range at step 21 " : "out of range at step 22 "), std::string::npos) << to_string(set) << energy << said;
+      EXPECT_NE(said.find("; sphere"), std::string::npos) << said;
+    }
+}
+
+// A dashpot at a hundred times R omega, long before the overlap is deep.
+TEST(Guards, AnImpactThatNoSphereSurvives) {
+  for (const InstructionSet set : available_instruction_sets()) {
+    EngineOptions engine;
+    engine.instruction_set = set;
+    SimulationSetup setup;
+    setup.pair = scenes::full_law(), setup.engine = engine, setup.gravity = 0.0;
+    const double R = 0.0025, omega = std::sqrt(setup.pair.k2 / sphere_mass(R, 2000.0));
+    setup.spheres.id = {1, 2};
+    setup.spheres.position = {0, 0, 0, 1.999 * R, 0, 0};
+    setup.spheres.velocity = {100.0 * R * omega, 0, 0, 0, 0, 0};
+    setup.spheres.radius = {R, R}, setup.spheres.density = {2000.0, 2000.0};
+    Simulation sim(setup);
+    sim.set_time_step(1e-9);
+    std::string said;
+    try {
+      sim.advance(4);
+    } catch (const RunError& error) {
+      said = error.what();
+    }
+    EXPECT_NE(said.find("out of range at step "), std::string::npos) << to_string(set) << said;
+  }
+}
+
+// A contact is judged by itself: one that is deep does not make a shallow and strong one of its chunk a fault.
+TEST(Guards, ForcesOfOneChunkAreJudgedOneByOne) {
+  constexpr SceneTraits scene = built_scenes[2].traits;
+  static_assert(scene.equal_spheres && scene.rolling == Rolling::absolute);
+  Chunk<scene> chunk{};
+  ActiveVectors active;
+  for (int at = 0; at < 4; ++at) active.at[active.count++] = at, chunk.lever[0][at] = 0.9, chunk.F[0][at] = 1.0;
+  chunk.lever[0][1] = 0.6;                      // deep and weak
+  chunk.F[1][2] = 12.0;                         // shallow and strong
+  EXPECT_FALSE((too_strong<Scalar, scene>(chunk, active, 10.0, 0.75)));
+  EXPECT_TRUE((too_strong<Scalar, scene>(chunk, active, 10.0, 2.0)));
+  chunk.F[2][1] = -12.0;                        // deep and strong
+  EXPECT_TRUE((too_strong<Scalar, scene>(chunk, active, 10.0, 0.75)));
+  chunk.F[2][1] = 0.0, chunk.S[0][1] = 12.0;    // by its share in rolling friction
+  EXPECT_TRUE((too_strong<Scalar, scene>(chunk, active, 10.0, 0.75)));
+  chunk.S[0][1] = nan;
+  EXPECT_TRUE((too_strong<Scalar, scene>(chunk, active, 10.0, 0.75)));
 }
 
 // Between R/2 and R an overlap may be in order, its force not.

@@ -182,6 +182,8 @@ TEST(Settle, ABedThatNeverRestsEndsWithExitCode6AndItsData) {
   EXPECT_EQ(run.outcome.exit_code, exit_goal);
   EXPECT_NE(run.outcome.message.find("settle: goal not reached within max_duration"), std::string::npos)
       << run.outcome.message;
+  EXPECT_NE(run.outcome.message.find("kinetic over potential energy "), std::string::npos) << run.outcome.message;
+  EXPECT_NE(run.outcome.message.find(" % of the weight (wanted: 100 within 1)"), std::string::npos) << run.outcome.message;
   ASSERT_EQ(run.outcome.stages.size(), 2u) << "nothing runs after it";
   EXPECT_EQ(run.stage("settle").last_step - run.stage("settle").first_step, 2000);
   EXPECT_FALSE(run.stage("settle").reached);

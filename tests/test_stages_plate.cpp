@@ -64,7 +64,10 @@ TEST(Compress, QuantitiesFollowTheirDefinitions) {
   int pressed = 0;
   for (std::size_t r = 0; r < run.series.rows.size(); ++r) {
     const double height = run.at(r, "height");
-    EXPECT_NEAR(run.at(r, "porosity"), 1.0 - solid / (area * height), 1e-13);
+    if (run.series.cell(r, "stage") == "release" || run.series.cell(r, "stage") == "crush")
+      EXPECT_TRUE(std::isnan(run.at(r, "porosity"))) << "without sides there is no volume";
+    else
+      EXPECT_NEAR(run.at(r, "porosity"), 1.0 - solid / (area * height), 1e-13);
     EXPECT_NEAR(run.at(r, "coordination_number"), 2.0 * run.at(r, "contacts") / 250, 1e-13);
     EXPECT_NEAR(run.at(r, "kinetic_to_potential"), run.at(r, "kinetic_energy") / run.at(r, "potential_energy"), 1e-15);
     const std::string& stage = run.series.cell(r, "stage");

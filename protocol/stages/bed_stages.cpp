@@ -1,5 +1,6 @@
 // Stages that make a bed and bring it to rest: fill, vibrate, settle, run.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -22,6 +23,26 @@ std::string pretty(double value, const char* unit) {
   if (size >= 1e3) return fmt::format("{:.4g} k{}", value / 1e3, unit);
   if (size > 0.0 && size < 0.1) return fmt::format("{:.4g} m{}", value * 1e3, unit);
   return fmt::format("{:.4g} {}", value, unit);
+}
+
+std::string what_is_missing(const Stand& stand, const Measures& m) {
+  const StageSpec& spec = stand.spec;
+  const Until& until = spec.until;
+  std::vector<std::string> parts;
+  const bool rests = spec.kind == StageKind::settle || spec.kind == StageKind::release;
+  if (rests || spec.kind == StageKind::fill) {
+    if (stand.c.gravity > 0.0) {
+      parts.push_back(fmt::format("kinetic over potential energy {:.2g} (wanted: {:.2g})", m.kinetic_energy / m.potential_energy, rests ? until.kinetic_to_potential : 1e-3));
+      if (stand.sim.plane(plate_bottom).present)
+        parts.push_back(fmt::format("bottom carries {:.1f} % of the weight (wanted: 100 within {})", 100.0 * m.support_force / m.weight, rests ? 1 : 10));
+    } else {
+      parts.push_back(fmt::format("kinetic energy {:.2g} J (wanted: {:.2g} of what it was)", m.kinetic_energy, until.kinetic_to_potential));
+    }
+    if (rests) parts.push_back(fmt::format("coordination number {:.2f} (may change by {:.2g} % in {})", m.coordination_number, 100.0 * until.coordination_change, pretty(until.window, "s")));
+  } else if (until.stress) {
+    parts.push_back(fmt::format("stress {} of {}", pretty(m.stress_top, "Pa"), pretty(*until.stress, "Pa")));
+  }
+  return fmt::format("{}", fmt::join(parts, "; "));
 }
 
 Stage make_stage(const StageSpec& spec) {

@@ -95,6 +95,16 @@ pid_t start(const fs::path& program, const std::vector<std::string>& words, cons
   ::_exit(127);
 }
 
+// Warnings of all stages of a run, for one cell of a table.
+std::string warnings_of(const nlohmann::json& summary) {
+  std::string text;
+  if (!summary.is_object() || !summary.contains("stages")) return text;
+  for (const nlohmann::json& stage : summary["stages"])
+    for (const nlohmann::json& warning : stage.value("warnings", nlohmann::json::array()))
+      text += (text.empty() ? "" : "; ") + stage.value("name", std::string()) + ": " + warning.get<std::string>();
+  return text;
+}
+
 class Runner {
  public:
   Runner(StudyPlan& plan, const RunnerOptions& options)
@@ -257,7 +267,7 @@ class Runner {
     } else if (is_done(options_.folder, job)) {
       outcome.state = JobState::done;
       outcome.exit_code = 0;
-      take_time_of(job);
+      take_summary(child.job);
       if (child.steal) {
         if (const auto now = steal_seconds()) outcome.steal_seconds = *now - *child.steal;
         const nlohmann::json timing = {{"wall_seconds", outcome.wall_seconds},
@@ -278,14 +288,17 @@ class Runner {
 
   void keep(std::size_t k) {
     outcomes_[k].state = JobState::kept;
-    take_time_of(plan_.jobs[k]);
+    take_summary(k);
     ++finished_;
     if (options_.ended) options_.ended(plan_.jobs[k], outcomes_[k]);
   }
 
-  // What a finished run cost: for the time that is left and for how far the guesses of the others are off.
-  void take_time_of(const Job& job) {
+  // What a finished run cost, for the time that is left and for how far the guesses of the others are off; and what it
+  // warned of, since runs of a study print nothing.
+  void take_summary(std::size_t k) {
+    const Job& job = plan_.jobs[k];
     const nlohmann::json summary = nlohmann::json::parse(text_of(run_folder(options_.folder, job) / "summary.json"), nullptr, false);
+    outcomes_[k].message = warnings_of(summary);
     const nlohmann::json performance = summary.is_object() ? summary.value("performance", nlohmann::json::object()) : nlohmann::json::object();
     done_weight_ += job.weight;
     done_steps_ += performance.value("particle_steps", job.weight);

@@ -25,7 +25,7 @@ enum class JobState { waiting, running, kept, done, failed, stopped };
 struct JobOutcome {
   JobState state = JobState::waiting;
   int exit_code = 0;          // of a failed job; the signal's number + 128 where one ended it
-  std::string message;        // last line that a failed job printed
+  std::string message;        // last line that a failed job printed; warnings of one that is done
   double wall_seconds = 0.0;  // of this process's run of it
   std::optional<double>
       steal_seconds;  // timed jobs: taken by other guests of the machine meanwhile, over all its cores

@@ -268,11 +268,15 @@ void judge_scans(Judge& judge) {
     const std::string text = fmt::format("{}: the minimum lies at {:g}, within its 95 % interval", what, wanted);
     if (!scan.minimum || !scan.minimum->inside)
       judge.say("scan", text, "no minimum inside the scan", false);
-    else if (!std::isfinite(scan.minimum->uncertainty))
+    else if (!std::isfinite(scan.minimum->uncertainty) || scan.minimum->degrees == 0)
       judge.say("scan", text, fmt::format("{:.3f} (uncertainty unknown)", scan.minimum->power), std::nullopt);
-    else
-      judge.say("scan", text, fmt::format("{:.3f} ± {:.3f}", scan.minimum->power, scan.minimum->uncertainty),
-                std::abs(scan.minimum->power - wanted) <= (scan.minimum->degrees > 0 ? student_975(scan.minimum->degrees) : 2.0) * scan.minimum->uncertainty);
+    else {
+      const auto [least, most] = std::minmax_element(scan.powers.begin(), scan.powers.end());
+      const double half_width = student_975(scan.minimum->degrees) * scan.minimum->uncertainty;
+      // An interval wider than what was tried says nothing of any power.
+      const std::optional<bool> holds = 2.0 * half_width > *most - *least ? std::nullopt : std::optional(std::abs(scan.minimum->power - wanted) <= half_width);
+      judge.say("scan", text, fmt::format("{:.3f} ± {:.3f}", scan.minimum->power, scan.minimum->uncertainty), holds);
+    }
   }
 }
 
