@@ -74,11 +74,10 @@ PLATEN_INLINE Pairs<I> fetch_pairs(const PairBatch& b, const LawConstants& c, st
   const Vec3<I> u_i = {i.row[8], i.row[9], i.row[10]}, u_j = {j.row[8], j.row[9], j.row[10]};
   const Vec3<I> spin = scale<I>(p.lever_i, u_i) + scale<I>(p.lever_j, u_j);
   p.v_n = dot(v, p.n);
-  const Vec3<I> across = sub_scaled<I>(v, p.v_n, p.n);
-  // Velocities are half a step old, and so is the normal that spins act around: n - across/distance dt/2. What that changes
-  // in the tangent plane comes from the spin about n alone [docs/laws.md, "Pairs"].
+  // Velocities are half a step old, and so is the normal that spins act around. What that changes in the tangent plane comes
+  // from the spin about n alone [docs/laws.md, "Pairs"].
   const Real lag = (I::set(0.5 * c.dt) * inverse) * dot(spin, p.n);
-  p.v_t = across + cross(p.n, add_scaled<I>(spin, lag, across));
+  p.v_t = sub_scaled<I>(v, p.v_n, p.n) + cross(p.n, add_scaled<I>(spin, lag, v));
   if constexpr (scene.rolling == Rolling::relative) p.w = scale<I>(inverse_R_i, u_i) - scale<I>(inverse_R_j, u_j);
   return p;
 }
