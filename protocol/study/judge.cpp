@@ -28,19 +28,21 @@ bool Judge::plain_are_there() const {
   return std::none_of(part_.curves.begin(), part_.curves.end(), [&](const MeasuredCurve& curve) { return is_plain(curve) && curve.runs.empty(); });
 }
 
-const MeasuredCurve* Judge::reference() const {
-  for (const MeasuredCurve* curve : plain())
-    if (curve->planned->radius == part_.plan->reference_radius) return curve;
+// The first planned one, with runs or not: another one in its place would be judged as what it is not.
+const MeasuredCurve* Judge::first(const std::function<bool(const PlannedCurve&)>& wanted) const {
+  for (const MeasuredCurve& curve : part_.curves)
+    if (is_plain(curve) && wanted(*curve.planned)) return curve.runs.empty() ? nullptr : &curve;
   return nullptr;
 }
 
+const MeasuredCurve* Judge::reference() const {
+  return first([&](const PlannedCurve& curve) { return curve.radius == part_.plan->reference_radius; });
+}
+
 const MeasuredCurve* Judge::scaled(double radius, std::optional<double> a, std::optional<double> b) const {
-  for (const MeasuredCurve* curve : plain()) {
-    const ScalingPowers& powers = curve->planned->powers;
-    if (curve->planned->radius == radius && (!a || powers.stiffness == *a) && (!b || powers.adhesion == *b))
-      return curve;
-  }
-  return nullptr;
+  return first([&](const PlannedCurve& curve) {
+    return curve.radius == radius && (!a || curve.powers.stiffness == *a) && (!b || curve.powers.adhesion == *b);
+  });
 }
 
 bool Judge::planned(double radius, double a, double b) const {

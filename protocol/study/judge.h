@@ -2,6 +2,7 @@
 #pragma once
 
 #include <limits>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -30,7 +31,7 @@ class Judge {
 
   const PartResults& part() const { return part_; }
 
-  // Unvaried curves; nullptr where there is none or none of its runs is done.
+  // Unvaried curves, the first planned one; nullptr where there is none or none of its runs is done.
   const MeasuredCurve* reference() const;
   const MeasuredCurve* scaled(double radius, std::optional<double> a, std::optional<double> b) const;
   bool planned(double radius, double a, double b) const;  // an unvaried curve of these powers, with runs or not
@@ -60,6 +61,7 @@ class Judge {
                                         const std::string& of_b);
 
  private:
+  const MeasuredCurve* first(const std::function<bool(const PlannedCurve&)>& wanted) const;
   const PartResults& part_;
   std::vector<Statement>* out_;
 };

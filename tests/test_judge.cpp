@@ -1,0 +1,103 @@
+// What studies say of themselves: verdicts need data, and an uncertainty that means something.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <map>
+
+#include "protocol/study/analysis.h"
+#include "protocol/study/judge.h"
+#include "protocol/study/statements.h"
+#include "tests/case_texts.h"
+#include "tests/program.h"
+#include "tests/study_folder.h"
+
+namespace platen::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+const char* const study_text = R"([study]
+title = "tiny"
+base = "tiny.toml"
+statements = ["figures-8-10", "figures-12-14", "like-reference", "cross-checks"]
+
+[[curve]]
+name = "reference"
+
+[[curve]]
+name = "coarse"
+radius = "3 mm"
+adhesion = [1, 2, 3]
+)";
+
+// What the scan of a power of adhesion with this minimum is said to show.
+Statement verdict_of(std::optional<Minimum> minimum) {
+  PlannedPart planned;
+  Study study;
+  planned.study = &study;
+  PartResults part;
+  part.plan = &planned;
+  ScanResult scan;
+  scan.power = ScanSpec::Power::adhesion;
+  scan.powers = {1.0, 1.5, 2.0, 2.5, 3.0}, scan.best_tried = 2.0;
+  scan.minimum = minimum;
+  part.scans = {scan};
+  std::vector<Statement> said;
+  Judge judge(part, said);
+  judge_scans(judge);
+  EXPECT_EQ(said.size(), 2u);
+  EXPECT_EQ(said.front().holds, true) << "2 is the best tried";
+  return said.back();
+}
+
+TEST(Judge, AScanNeedsAnUncertaintyThatMeansSomething) {
+  const auto holds = [](double power, double uncertainty, int degrees, bool inside = true) {
+    return verdict_of(Minimum{power, uncertainty, 0.0, inside, degrees}).holds;
+  };
+  EXPECT_EQ(holds(2.1, 0.05, 2), true) << "4.3 standard errors at two degrees of freedom";
+  EXPECT_EQ(holds(2.3, 0.05, 2), false);
+  EXPECT_EQ(holds(2.1, 0.05, 0), std::nullopt) << "one seed";
+  EXPECT_EQ(holds(2.1, std::nan(""), 2), std::nullopt);
+  EXPECT_EQ(holds(2.1, 0.3, 2), std::nullopt) << "2.6 powers wide, where 2 were tried";
+  EXPECT_EQ(holds(3.4, 0.05, 2, false), false) << "no minimum inside";
+  EXPECT_EQ(verdict_of(std::nullopt).holds, false);
+}
+
+// A curve without a single run must leave what needs it open, and nothing else changed.
+TEST(Judge, WhatHasNoRunsIsNotJudged) {
+  const StudyFolder study(study_text, read_file(std::string(PLATEN_SOURCE_DIR) + "/protocol/cases/quick.toml"));
+  // The quick case at a tenth of its spheres and five times its speed.
+  const std::vector<std::string> small{"--set", "study.set=[\"particles.count=60\", \"particles.law.f0=-0.01\", \"stage.compress.speed=0.1\", "
+                                                "\"stage.unload.speed=0.1\", \"stage.crush.speed=0.1\", \"stage.settle.max_duration=5\"]"};
+  const ProgramResult whole = run_program(study.words("whole", small));
+  ASSERT_EQ(whole.exit_code, 0) << whole.report();
+  const Study read = read_study(study.file(), {small[1]});
+  const StudyPlan plan = make_plan(read);
+  const auto judged = [&](const fs::path& folder) {
+    std::set<std::string> damaged;
+    std::map<std::string, Statement> out;
+    for (const Statement& s : judge(plan, analyse(plan, folder, damaged))) out.emplace(s.part + s.figure + s.text, s);
+    EXPECT_TRUE(damaged.empty());
+    return out;
+  };
+  const auto all = judged(study.folder / "whole");
+  std::size_t lost = 0;
+  for (const Job& job : plan.jobs) {
+    const fs::path folder = study.folder / ("without-" + job.name);
+    fs::copy(study.folder / "whole", folder, fs::copy_options::recursive);
+    fs::remove_all(folder / "runs" / job.name);
+    const auto some = judged(folder);
+    for (const auto& [what, s] : some) {
+      if (!s.holds) continue;
+      const auto before = all.find(what);
+      ASSERT_NE(before, all.end()) << what;
+      EXPECT_EQ(s.number, before->second.number) << job.name << " is missing: " << what;
+      EXPECT_EQ(s.holds, before->second.holds) << what;
+    }
+    for (const auto& [what, s] : all) lost += s.holds && (some.find(what) == some.end() || !some.at(what).holds);
+  }
+  EXPECT_GT(lost, 20u) << "nothing was lost: the test shows nothing";
+}
+
+}  // namespace
+}  // namespace platen::test
