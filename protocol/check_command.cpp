@@ -11,6 +11,7 @@
 #include "kernels/kernel_table.h"
 #include "protocol/experiment.h"
 #include "protocol/progress.h"
+#include "protocol/stages.h"
 #include "protocol/usable_cores.h"
 
 namespace platen {
@@ -68,6 +69,15 @@ void add_notes(const Case& c, CheckReport& report) {
   // Plates are stiffer than pairs by a factor that depends on how hard they press: two was seen at 40 kPa.
   if (c.time.step && !c.time.allow_unstable && (c.plates.top || c.plates.bottom) && *c.time.step > 0.45 * report.limits.dt_limit)
     report.notes.push_back("time.step is near dt_limit of a bed without plates; spheres at a plate may have half of it, and a run looks at its own bed");
+  if (const PairLaw& law = c.particles.law; law.rolling_friction == 0.0 && (law.f0 != 0.0 || law.k_adh > 0.0))
+    report.notes.push_back("rolling_friction = 0 with cohesion: a sphere held between two others may spin on, and a bed take long to come to rest");
+  bool sides = c.box.given && c.box.sides != Sides::open;
+  for (const StageSpec& s : c.stages) {
+    if (s.kind == StageKind::release) sides = false;
+    if (s.kind == StageKind::crush && sides) report.notes.push_back(s.name + ": the sides are still there: its strength will not be an unconfined one; a stage `release` takes them away");
+    if (s.kind == StageKind::compress && s.until.stress && *s.until.stress < s.strain_zero)
+      report.notes.push_back(fmt::format("{}: ends at {} before strain begins to count at {} (strain_zero)", s.name, pretty(*s.until.stress, "Pa"), pretty(s.strain_zero, "Pa")));
+  }
   for (std::size_t k = 0; k < report.stages.size(); ++k)
     if (const ExpectedStage& e = report.stages[k]; e.needed > e.simulated * (1.0 + 1e-9))
       report.notes.push_back(fmt::format("{}: needs about {:.3g} s; max_duration = {:.3g} s ends the run before that (exit code {})", e.name, e.needed,

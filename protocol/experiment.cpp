@@ -210,6 +210,7 @@ class Experiment {
     std::visit([&](auto& s) { s.begin(stand); }, stage);
     if (spec.kind == StageKind::vibrate || spec.kind == StageKind::release) stand.strain_zero_height.reset();  // another bed
     strain_zero_height_ = stand.strain_zero_height;
+    if (spec.kind == StageKind::crush && sim_->confined()) warn("the sides are still there: its strength is not an unconfined one; a stage `release` takes them away");
     const double speed = spec.speed;
     sample(index, speed);
     const double residual_before = current_.last.measures.energy_residual, dissipated_before = current_.last.measures.ledger.dissipated();
@@ -267,6 +268,8 @@ class Experiment {
 
     sample(index, speed);
     const Measures& m = current_.last.measures;
+    if (spec.kind == StageKind::hold && end != End::stopped && std::fabs(m.stress_top - spec.stress) > 0.02 * spec.stress)
+      warn(fmt::format("the stress at its end is {}, not {}: a longer duration lets it settle", pretty(m.stress_top, "Pa"), pretty(spec.stress, "Pa")));
     const double dissipated = m.ledger.dissipated();
     current_.residual_share = !c_.output.energy ? std::numeric_limits<double>::quiet_NaN() : (m.energy_residual - residual_before) / std::max(dissipated - dissipated_before, 0.01 * dissipated);
     if (std::fabs(current_.residual_share) > 0.01) warn(fmt::format("the energy ledger is open by {:.2g} % of what was dissipated; a smaller time step closes it", 100.0 * std::fabs(current_.residual_share)));

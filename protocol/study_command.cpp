@@ -142,6 +142,8 @@ int study_command(const StudyCommand& command) {
   if (!command.quiet)
     spdlog::info("{}: {} runs, {}, into {}", command.study_file.filename().string(), plan.jobs.size(),
                  runs_at_a_time(plan, options.jobs), command.folder.string());
+  const auto other = std::count_if(plan.jobs.begin(), plan.jobs.end(), [&](const Job& job) { return holds_another(command.folder, job); });
+  if (other > 0 && !command.quiet) spdlog::warn("{} finished run{} of other cases in {} {} made anew", other, other == 1 ? "" : "s", command.folder.string(), other == 1 ? "is" : "are");
   const std::vector<JobOutcome> outcomes = run_jobs(plan, options);
   printer.clear();
 

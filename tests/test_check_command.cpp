@@ -183,14 +183,33 @@ duration = "1 ms"
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 2) << "check writes nothing";
 }
 
-TEST(CheckCommand, AStageThatItsTimeDoesNotSufficeForHasANote) {
-  const auto notes = [](const std::vector<std::string>& overrides) {
-    std::string all;
-    for (const std::string& note : check_report(good(overrides), 1).notes) all += note + "\n";
-    return all;
+std::string notes_of(const std::vector<std::string>& overrides, const std::string& text = good_case) {
+  std::string all;
+  for (const std::string& note : check_report(parse_case(text, "case.toml", ".", overrides), 1).notes) all += note + "\n";
+  return all;
+}
+
+TEST(CheckCommand, NotesOnWhatARunWouldShowLate) {
+  const std::string quick = read_file(std::string(PLATEN_SOURCE_DIR) + "/protocol/cases/quick.toml");
+  const auto has = [&](const std::string& what, const std::vector<std::string>& overrides) {
+    return notes_of(overrides, quick).find(what) != std::string::npos;
   };
-  EXPECT_EQ(notes({}).find("max_duration"), std::string::npos) << notes({});
-  const std::string slow = notes({"stage.compress.speed=\"0.01 mm/s\""});
+  EXPECT_FALSE(has("rolling_friction = 0 with cohesion", {}));
+  EXPECT_TRUE(has("rolling_friction = 0 with cohesion", {"particles.law.rolling_friction=0"}));
+  EXPECT_FALSE(has("rolling_friction = 0 with cohesion", {"particles.law.rolling_friction=0", "particles.law.k_adh=0"}));
+  EXPECT_FALSE(has("ends at", {}));
+  EXPECT_TRUE(has("compress: ends at 2 kPa before strain begins to count at 5 kPa", {"stage.compress.until.stress=\"2 kPa\""}));
+  EXPECT_FALSE(has("sides are still there", {}));
+  const std::size_t release = quick.find("[[stage]]\nkind = \"release\""), crush = quick.find("[[stage]]", release + 1);
+  ASSERT_LT(crush, quick.size());
+  EXPECT_NE(notes_of({}, quick.substr(0, release) + quick.substr(crush)).find("crush: the sides are still there"), std::string::npos);
+  EXPECT_FALSE(has("near dt_limit", {"time.step=\"5 us\""}));
+  EXPECT_TRUE(has("near dt_limit", {"time.step=\"20 us\""}));
+}
+
+TEST(CheckCommand, AStageThatItsTimeDoesNotSufficeForHasANote) {
+  EXPECT_EQ(notes_of({}).find("max_duration"), std::string::npos) << notes_of({});
+  const std::string slow = notes_of({"stage.compress.speed=\"0.01 mm/s\""});
   EXPECT_NE(slow.find("compress: needs about "), std::string::npos) << slow;
   EXPECT_NE(slow.find("max_duration = 60 s ends the run before that (exit code 6)"), std::string::npos) << slow;
 }

@@ -40,7 +40,7 @@ std::string now_iso8601() {
 }
 
 bool holds_run(const fs::path& folder) {
-  for (const char* name : {"case.toml", "series.csv", "results.h5", "summary.json"})
+  for (const char* name : {"series.csv", "results.h5", "summary.json"})
     if (fs::exists(folder / name)) return true;
   return false;
 }

@@ -379,6 +379,13 @@ bool is_done(const fs::path& study_folder, const Job& job) {
   return summary.is_object() && summary.contains("exit_code") && summary["exit_code"] == 0;
 }
 
+bool holds_another(const fs::path& study_folder, const Job& job) {
+  if (job.match && !job.match->met) return false;  // its case is not known yet
+  const fs::path folder = run_folder(study_folder, job);
+  std::error_code ignored;
+  return fs::is_regular_file(folder / "summary.json", ignored) && text_of(folder / "case.toml") != job.c.text;
+}
+
 std::vector<JobOutcome> run_jobs(StudyPlan& plan, const RunnerOptions& options) {
   return Runner(plan, options).run();
 }

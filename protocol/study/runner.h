@@ -52,6 +52,8 @@ std::filesystem::path run_folder(const std::filesystem::path& study_folder, cons
 
 // Whether the folder of the job holds its finished run. Of a matched job only once its case is known (take_match).
 bool is_done(const std::filesystem::path& study_folder, const Job& job);
+// Whether the job's folder holds a finished run of another case, which the job replaces.
+bool holds_another(const std::filesystem::path& study_folder, const Job& job);
 
 // One outcome a job; matched jobs get their cases. A failing job does not end the others. Throws OutputError where the study's own files cannot be
 // written or no process can be started.
