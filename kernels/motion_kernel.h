@@ -23,6 +23,7 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
       records[lane] = I::load_record(b.sum + record_size * static_cast<std::int64_t>(k + lane));
     Real f[8];
     I::from_records(records, f);
+    if constexpr (guarded) strongest = I::max(strongest, I::fma(f[2], f[2], I::fma(f[1], f[1], f[0] * f[0])));
     Real inverse_m, m, R, inverse_R;
     if constexpr (equal_spheres) {
       inverse_m = I::set(c.inverse_mass), m = I::set(c.mass), R = I::set(c.radius), inverse_R = I::set(c.inverse_radius);
@@ -77,10 +78,7 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
     const Vec3<I> excess = {v.x - I::set(c.mean_x), v.y - I::set(c.mean_y), v.z - I::set(c.mean_z)};
     const Real speed2 = dot(excess, excess);
     largest = I::max(largest, speed2 * I::load(b.inverse_room2 + k));
-    if constexpr (guarded) {
-      squares = squares + speed2;
-      strongest = I::max(strongest, I::fma(f[2], f[2], I::fma(f[1], f[1], f[0] * f[0])));
-    }
+    if constexpr (guarded) squares = squares + speed2;
   }
   const double pace = I::largest(largest);
   totals.largest_pace = totals.largest_pace > pace ? totals.largest_pace : pace;
