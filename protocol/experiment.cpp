@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <csignal>
 #include <cmath>
 #include <limits>
 
@@ -189,7 +190,7 @@ class Experiment {
 
   // Why the run must stop now, if it must.
   std::optional<std::string> stop_request() const {
-    if (options_.stop_signal && options_.stop_signal->load() != 0) return fmt::format("signal {}", options_.stop_signal->load());
+    if (options_.stop_signal && options_.stop_signal->load() != 0) return fmt::format("signal {}{}", options_.stop_signal->load(), options_.stop_signal->load() == SIGINT ? " (Ctrl-C)" : "");
     if (options_.max_walltime && now() - wall_begin_ > *options_.max_walltime)
       return fmt::format("wall time of {:.4g} s is over", *options_.max_walltime);
     return std::nullopt;

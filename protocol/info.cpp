@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "protocol/case_file.h"
+#include "protocol/experiment.h"
 #include "protocol/info_case.h"
+#include "protocol/output.h"
 #include "protocol/output/files.h"
 #include "protocol/output/hdf5_file.h"
 #include "protocol/output/results_h5.h"
@@ -155,13 +157,28 @@ Json read_summary(const fs::path& file) {
   }
 }
 
+// "done", "stopped by request (exit code 75)", "done up to fill, 5 more stages were not asked for".
+std::string state_of(const Json& summary, const fs::path& case_file) {
+  const int code = summary.at("exit_code").get<int>();
+  if (code != exit_done) return fmt::format("{} (exit code {})", code == exit_stopped ? "stopped by request" : code == exit_goal ? "a stage missed its goal" : "failed", code);
+  const Json& stages = summary.at("stages");
+  std::size_t planned = stages.size();
+  try {
+    planned = read_case(case_file, {}, CaseUse::resume).stages.size();
+  } catch (const CaseError&) {  // of another version: what it planned is not known
+  }
+  if (planned <= stages.size() || stages.empty()) return "done (exit code 0)";
+  return fmt::format("done up to {} (exit code 0); {} more stage{} of the case not asked for", stages.back().at("name").get<std::string>(), planned - stages.size(),
+                     planned - stages.size() == 1 ? "" : "s");
+}
+
 std::string describe_run(const fs::path& folder, bool json) {
   const std::string title = title_of(folder / "case.toml");
   const bool finished = fs::exists(folder / "summary.json");
   if (!finished) {
     const std::vector<StageLine> lines = lines_of_series(folder);
-    if (!json) return fmt::format("run      {}\ntitle    {}\nstate    not finished\n\n{}", folder.string(), title,
-                                  stage_table(lines));
+    if (!json) return fmt::format("run      {}\ntitle    {}\nstate    {}\n\n{}", folder.string(), title,
+                                  RunFolder::in_use(folder) ? "running" : "not finished, and nobody works on it: it was killed", stage_table(lines));
     Json result = {{"kind", "run"}, {"folder", folder.string()}, {"title", title}, {"finished", false}};
     result["stages"] = Json::array();
     for (const StageLine& line : lines) {
@@ -185,9 +202,8 @@ std::string describe_run(const fs::path& folder, bool json) {
     return to_line(result);
   }
   try {
-    return fmt::format("run      {}\ntitle    {}\nversion  platen {}\nstate    exit code {}\nhash     {}\n\n{}",
-                       folder.string(), title, summary.at("version").get<std::string>(),
-                       summary.at("exit_code").get<int>(), summary.value("state_hash", "none"),
+    return fmt::format("run      {}\ntitle    {}\nversion  platen {}\nstate    {}\nhash     {}\n\n{}",
+                       folder.string(), title, summary.at("version").get<std::string>(), state_of(summary, folder / "case.toml"), summary.value("state_hash", "none"),
                        stage_table(lines_of_summary(summary)));
   } catch (const Json::exception& error) {
     throw OutputError((folder / "summary.json").string() + ": " + error.what());

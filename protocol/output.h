@@ -73,6 +73,9 @@ class RunFolder {
   static RunFolder reopen(const std::filesystem::path& folder, std::optional<std::size_t> rows,
                           std::vector<StageResult> closed);
 
+  // Whether a process works in the folder at this moment.
+  static bool in_use(const std::filesystem::path& folder);
+
   const std::filesystem::path& path() const { return path_; }
   void set_info(RunInfo info) { info_ = std::move(info); }  // before the first close_stage
 

@@ -168,6 +168,17 @@ std::vector<std::string> check_particle_positions(const ParticleFile& file, cons
   std::vector<std::string> problems;
   outside.write(name, "are outside", problems);
 
+  // One radius in another unit would overlap everything: what is wrong is the radius.
+  Findings wide;
+  const double widest = 0.5 * std::min(box.width, box.depth);
+  if (box.sides != Sides::open && widest > 0.0)
+    for (std::size_t i = 0; i < t.size() && !wide.full(); ++i)
+      if (t.radius[i] > widest)
+        wide.add(file.line[i], fmt::format("radius: particle {} of {:.6g} m does not fit into the box; allowed: at most {:.6g} m", t.id[i], t.radius[i], widest));
+  const std::size_t before = problems.size();
+  wide.write(name, "do not fit", problems);
+  if (problems.size() > before) return problems;
+
   Findings overlaps;
   const bool periodic = box.sides == Sides::periodic;
   find_overlaps(file, periodic ? box.width : 0.0, periodic ? box.depth : 0.0, overlaps);

@@ -15,6 +15,12 @@ namespace {
 constexpr double in_place_interval = 0.1, line_interval = 10.0;  // [s]
 constexpr std::size_t line_columns = 160;                        // where there is no terminal
 
+// Two decimals, and no minus before nothing.
+std::string kilopascal(double stress) {
+  const std::string text = fmt::format("{:.2f} kPa", 1e-3 * stress);
+  return text == "-0.00 kPa" ? "0.00 kPa" : text;
+}
+
 bool is_capable_terminal(std::FILE* stream) {
   const char* term = std::getenv("TERM");
   return isatty(fileno(stream)) != 0 && term != nullptr && std::strcmp(term, "dumb") != 0;
@@ -61,7 +67,7 @@ std::string progress_line(const Progress& p, std::size_t columns) {
     parts.push_back({fmt::format("{:.0f} %", 100.0 * std::clamp(*p.fraction, 0.0, 1.0)), 1});
   }
   parts.push_back({fmt::format("t {:.3f} s", p.time), 2});
-  parts.push_back({fmt::format("{:.2f} kPa", 1e-3 * m.stress_top), 4});
+  parts.push_back({kilopascal(m.stress_top), 4});
   if (std::isfinite(p.row.strain)) parts.push_back({fmt::format("strain {:.2f} %", 100.0 * p.row.strain), 5});
   if (std::isfinite(m.porosity)) parts.push_back({fmt::format("porosity {:.3f}", m.porosity), 6});
   parts.push_back({fmt::format("CN {:.2f}", m.coordination_number), 7});
@@ -84,9 +90,9 @@ std::string progress_line(const Progress& p, std::size_t columns) {
 
 std::string stage_line(const StageResult& stage, int number, int stages) {
   const Measures& m = stage.last.measures;
-  std::string line = fmt::format("{}/{} {}: {}; {:.3f} s simulated in {}, {:.2f} kPa", number, stages, stage.name,
+  std::string line = fmt::format("{}/{} {}: {}; {:.3f} s simulated in {}, {}", number, stages, stage.name,
                                  stage.end_reason, stage.time_end - stage.time_begin, duration_text(stage.wall_seconds),
-                                 1e-3 * m.stress_top);
+                                 kilopascal(m.stress_top));
   if (std::isfinite(stage.last.strain)) line += fmt::format(", strain {:.2f} %", 100.0 * stage.last.strain);
   if (std::isfinite(m.porosity)) line += fmt::format(", porosity {:.3f}", m.porosity);
   line += fmt::format(", CN {:.2f}", m.coordination_number);

@@ -39,13 +39,23 @@ TEST_F(Info, RunThatIsStillGoing) {
   run.append(row(2, 1), 2);
   const std::string series = contents(root / "run/series.csv");
   const std::string text = describe(root / "run", false);
-  for (const char* part : {"not finished", "stress 40 kPa reached", "not ended", "unload"})
+  for (const char* part : {"running", "stress 40 kPa reached", "not ended", "unload"})
     EXPECT_TRUE(has(text, part)) << part << "\n" << text;
   const Json json = Json::parse(describe(root / "run", true));
   EXPECT_EQ(json.at("finished"), false);
   EXPECT_EQ(json.at("stages").at(2).at("values").at("porosity"), row(2, 1).measures.porosity);
   EXPECT_NEAR(json.at("stages").at(2).at("time").get<double>(), 1e-3, 1e-15);
   EXPECT_EQ(contents(root / "run/series.csv"), series);  // looking changes nothing
+}
+
+TEST_F(Info, RunThatWasKilled) {
+  {
+    RunFolder run = RunFolder::create(root / "run", case_text, false);
+    run.set_info(info());
+    write_stage(run, 0);
+  }
+  const std::string text = describe(root / "run", false);
+  EXPECT_TRUE(has(text, "nobody works on it")) << text;
 }
 
 TEST_F(Info, Hdf5File) {

@@ -128,6 +128,13 @@ TEST(ParticlePositions, Overlaps) {
 }
 
 // The grid finds what trying all pairs finds: narrow boxes, radii over two decades, far coordinates.
+TEST(ParticlePositions, ARadiusInAnotherUnit) {
+  const auto found = positions("1,1,1,1\n5,5,5,20\n7,7,7,1\n", Sides::periodic);
+  ASSERT_EQ(found.size(), 1u) << "what it overlaps is not what is wrong";
+  EXPECT_EQ(found.at(0), "p.csv:3: radius: particle 1 of 20 m does not fit into the box; allowed: at most 5 m");
+  EXPECT_GT(positions("1,1,1,1\n5,5,5,20\n7,7,7,1\n", Sides::open).size(), 1u);
+}
+
 TEST(ParticlePositions, GridAgreesWithAllPairs) {
   std::mt19937 random(11);
   const auto uniform = [&random](double a, double b) { return a + (b - a) * (random() / 4294967296.0); };
@@ -141,7 +148,9 @@ TEST(ParticlePositions, GridAgreesWithAllPairs) {
       t.id.push_back(i);
       t.x.push_back(uniform(0.0, b.width) + shift), t.y.push_back(uniform(0.0, b.depth)),
           t.z.push_back(uniform(1.0, 30.0));
-      t.radius.push_back(std::pow(10.0, uniform(-1.5, 0.2)));
+      // What does not fit into a box is refused before overlaps are looked for.
+      const double widest = periodic ? 0.5 * std::min(b.width, b.depth) : 10.0;
+      t.radius.push_back(std::min(widest, std::pow(10.0, uniform(-1.5, 0.2))));
       file.line.push_back(static_cast<std::size_t>(i) + 2);
     }
     std::size_t expected = 0;

@@ -123,6 +123,11 @@ RunFolder::RunFolder(fs::path path, UniqueFd lock, std::string case_text, Series
       log_(std::move(log)),
       start_time_(now_iso8601()) {}
 
+bool RunFolder::in_use(const fs::path& folder) {
+  const UniqueFd fd(::open((folder / lock_name).c_str(), O_RDONLY | O_CLOEXEC));
+  return fd.get() >= 0 && ::flock(fd.get(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+}
+
 RunFolder RunFolder::create(const fs::path& folder, const std::string& case_text, bool force) try {
   fs::create_directories(folder);
   if (force) refuse_to_replace_case(folder, case_text);
