@@ -8,8 +8,10 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstdio>
 #include <set>
+#include <thread>
 
 #include "protocol/experiment.h"
 #include "protocol/output/files.h"
@@ -50,8 +52,11 @@ UniqueFd lock(const fs::path& folder) {
   const fs::path file = folder / ".lock";
   UniqueFd fd(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
   if (fd.get() < 0) throw system_error(file, "cannot open", errno);
-  if (::flock(fd.get(), LOCK_EX | LOCK_NB) != 0)
-    throw OutputError(folder.string() + ": another process works in this folder");
+  // A child of a study that was killed just now holds the lock until it begins the run, which it then does not begin.
+  for (int k = 0; ::flock(fd.get(), LOCK_EX | LOCK_NB) != 0; ++k) {
+    if (errno != EWOULDBLOCK || k == 200) throw OutputError(folder.string() + ": another process works in this folder");
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
   return fd;
 }
 
