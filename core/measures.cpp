@@ -45,7 +45,7 @@ Profile profile(const Snapshot& snapshot, double area, int slabs) {
   result.z.assign(count, nan);
   result.porosity.assign(count, nan);
   result.coordination_number.assign(count, nan);
-  if (!(height > 0.0) || !(area > 0.0)) return result;
+  if (!(height > 0.0)) return result;
 
   const auto edge = [&](std::size_t k) { return z_bottom + height * static_cast<double>(k) / slabs; };
   const auto slab_at = [&](double z) {  // of a height; clamped, so that the top edge belongs to the last slab
@@ -69,7 +69,7 @@ Profile profile(const Snapshot& snapshot, double area, int slabs) {
   const double slab_volume = area * height / slabs;
   for (std::size_t k = 0; k < count; ++k) {
     result.z[k] = z_bottom + height * (static_cast<double>(k) + 0.5) / slabs;
-    result.porosity[k] = 1.0 - solid[k] / slab_volume;
+    if (area > 0.0) result.porosity[k] = 1.0 - solid[k] / slab_volume;
     if (centres[k] > 0.0) result.coordination_number[k] = ends[k] / centres[k];
   }
   return result;

@@ -260,11 +260,13 @@ void Simulation::integrate(Batch& b, const MotionConstants& c) {
   b.rolling += totals.rolling;
   b.out_of_range = b.out_of_range || totals.out_of_range;
   // Pairs far faster than R omega give more than sums hold exactly before they overlap deeply: it shows in a sphere's sum.
-  const double most = 4.0 * law_.force.bound;
+  // A quarter of what sums hold: 4 F for equal spheres, more where a large one may have many small neighbours.
+  const double most = 0.25 * 0x1p53 / law_.force.inverse;
   if (!(totals.strongest < most * most)) b.out_of_range = b.out_of_range || !pairs_within(b, most);
 }
 
-// Whether pairs push every sphere of a batch with less than `most` [N]; plates and walls may push harder.
+// Whether pairs push every sphere of a batch with less than `most` [N]; plates and walls may push harder. Only spheres that
+// are pushed that hard altogether are looked at, so that what else the batch holds does not matter.
 bool Simulation::pairs_within(const Batch& b, double most) const {
   AlignedArray<double> by_plates;
   by_plates.assign(3 * static_cast<std::size_t>(b.count), 0.0);
@@ -274,12 +276,12 @@ bool Simulation::pairs_within(const Batch& b, double most) const {
         for (std::size_t axis = 0; axis < 3; ++axis)
           by_plates[3 * static_cast<std::size_t>(list.particle[m] - b.first) + axis] += list.records[record_size * m + axis];
   for (std::size_t k = 0; k < static_cast<std::size_t>(b.count); ++k) {
-    double size2 = 0.0;
+    double size2 = 0.0, all2 = 0.0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double f = b.sum[record_size * k + axis] - by_plates[3 * k + axis];
-      size2 += f * f;
+      const double all = b.sum[record_size * k + axis], f = all - by_plates[3 * k + axis];
+      size2 += f * f, all2 += all * all;
     }
-    if (!(size2 < most * most)) return false;
+    if (!(all2 < most * most) && !(size2 < most * most)) return false;
   }
   return true;
 }

@@ -144,7 +144,7 @@ PLATEN_INLINE void for_each_energy(const PairEnergies<I>& energy, const Visit& v
 }
 
 // Whether a contact of the chunk whose lever on either side is below `watched` is out of its bound [N]. Each contact is
-// judged by itself, so that what else its chunk holds does not matter. Written so that a NaN counts as too strong.
+// judged by itself, so that what else its chunk holds does not matter. Written so that a force that is no number counts as too strong.
 template <class I, SceneTraits scene>
 bool too_strong(const Chunk<scene>& chunk, const ActiveVectors& active, double bound, double watched) {
   bool strong = false;

@@ -114,6 +114,9 @@ void check_stages(const Case& c, const CaseFacts& facts, Problems& problems) {
       sides = Sides::open;
     }
     const Until& until = stage.until;
+    if (until.porosity && facts.sides_good && sides == Sides::open) {
+      refuse("until.porosity needs sides, without which a bed has no volume; allowed: before `release`, with box.sides = \"periodic\" or \"walls\"");
+    }
     if (stage.kind == StageKind::unload && until.strain && !until.stress && !until.displacement && !until.duration &&
         !strain_known) {
       refuse(

@@ -54,7 +54,8 @@ UniqueFd lock(const fs::path& folder) {
   if (fd.get() < 0) throw system_error(file, "cannot open", errno);
   // A child of a study that was killed just now holds the lock until it begins the run, which it then does not begin.
   for (int k = 0; ::flock(fd.get(), LOCK_EX | LOCK_NB) != 0; ++k) {
-    if (errno != EWOULDBLOCK || k == 200) throw OutputError(folder.string() + ": another process works in this folder");
+    if (errno != EWOULDBLOCK) throw system_error(file, "cannot lock", errno);
+    if (k == 200) throw OutputError(folder.string() + ": another process works in this folder");
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   return fd;

@@ -154,6 +154,34 @@ TEST(Guards, AnImpactThatNoSphereSurvives) {
   }
 }
 
+// A sphere that a plate stops hard is no fault, and does not make one of another that pairs and a plate hold in balance.
+TEST(Guards, APlateMayPushHarderThanPairs) {
+  for (const int batch : {0, 8}) {
+    EngineOptions engine;
+    engine.batch = batch;
+    SimulationSetup setup;
+    setup.pair = scenes::full_law(), setup.engine = engine, setup.gravity = 0.0;
+    setup.plate.particle_young_modulus = 7e10, setup.plate.young_modulus = 7e10;
+    const double R = 0.0025;
+    for (int k = 0; k < 24; ++k) {
+      setup.spheres.id.push_back(k);
+      for (const double x : {3.0 * R * k, 0.0, 1.001 * R}) setup.spheres.position.push_back(x);
+      for (const double v : {0.0, 0.0, -20.0}) setup.spheres.velocity.push_back(k == 3 ? v : 0.0);
+      setup.spheres.radius.push_back(R), setup.spheres.density.push_back(2000.0);
+    }
+    Simulation sim(setup);
+    sim.set_time_step(1e-7);
+    PlaneMotion bottom;
+    sim.set_plane(plate_bottom, bottom);
+    double strongest = 0.0;
+    for (int k = 0; k < 400; ++k) {
+      ASSERT_NO_THROW(sim.advance(1)) << "batch " << batch;
+      strongest = std::max(strongest, sim.measure(false).support_force);
+    }
+    EXPECT_GT(strongest, 4.0 * sim.law().force.bound) << "the plate never pushed hard: the test shows nothing";
+  }
+}
+
 // A contact is judged by itself: one that is deep does not make a shallow and strong one of its chunk a fault.
 TEST(Guards, ForcesOfOneChunkAreJudgedOneByOne) {
   constexpr SceneTraits scene = built_scenes[2].traits;

@@ -127,7 +127,6 @@ TEST(ParticlePositions, Overlaps) {
   EXPECT_TRUE(positions("0.1,5,5,1\n9.8,5,5,1\n", Sides::walls).empty());
 }
 
-// The grid finds what trying all pairs finds: narrow boxes, radii over two decades, far coordinates.
 TEST(ParticlePositions, ARadiusInAnotherUnit) {
   const auto found = positions("1,1,1,1\n5,5,5,20\n7,7,7,1\n", Sides::periodic);
   ASSERT_EQ(found.size(), 1u) << "what it overlaps is not what is wrong";
@@ -135,6 +134,7 @@ TEST(ParticlePositions, ARadiusInAnotherUnit) {
   EXPECT_GT(positions("1,1,1,1\n5,5,5,20\n7,7,7,1\n", Sides::open).size(), 1u);
 }
 
+// The grid finds what trying all pairs finds: narrow boxes, radii over two decades, far coordinates.
 TEST(ParticlePositions, GridAgreesWithAllPairs) {
   std::mt19937 random(11);
   const auto uniform = [&random](double a, double b) { return a + (b - a) * (random() / 4294967296.0); };

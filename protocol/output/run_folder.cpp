@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <ctime>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "protocol/output.h"
 #include "protocol/output/results_h5.h"
@@ -69,7 +70,13 @@ UniqueFd lock(const fs::path& folder) {
   const fs::path file = folder / lock_name;
   UniqueFd fd(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
   if (fd.get() < 0) throw system_error(file, "cannot open", errno);
-  if (::flock(fd.get(), LOCK_EX | LOCK_NB) != 0) {
+  // `info` holds it for a moment to see whether anybody does.
+  bool held = ::flock(fd.get(), LOCK_EX | LOCK_NB) == 0;
+  for (int k = 0; !held && errno == EWOULDBLOCK && k < 20; ++k) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    held = ::flock(fd.get(), LOCK_EX | LOCK_NB) == 0;
+  }
+  if (!held) {
     if (errno != EWOULDBLOCK) throw system_error(file, "cannot lock", errno);
     char holder[32] = "";
     const ssize_t n = ::pread(fd.get(), holder, sizeof holder - 1, 0);

@@ -38,9 +38,14 @@ std::string what_is_missing(const Stand& stand, const Measures& m) {
     } else {
       parts.push_back(fmt::format("kinetic energy {:.2g} J (wanted: {:.2g} of what it was)", m.kinetic_energy, until.kinetic_to_potential));
     }
+    if (!rests) parts.push_back("no sphere may be faster than after a fall by its radius, all that for 50 ms");
     if (rests) parts.push_back(fmt::format("coordination number {:.2f} (may change by {:.2g} % in {})", m.coordination_number, 100.0 * until.coordination_change, pretty(until.window, "s")));
-  } else if (until.stress) {
-    parts.push_back(fmt::format("stress {} of {}", pretty(m.stress_top, "Pa"), pretty(*until.stress, "Pa")));
+  } else {
+    if (until.stress) parts.push_back(fmt::format("stress {} (wanted: {})", pretty(m.stress_top, "Pa"), pretty(*until.stress, "Pa")));
+    if (until.strain && stand.strain_zero_height) parts.push_back(fmt::format("strain {:.2f} % (wanted: {:.2f})", 100.0 * (1.0 - m.height / *stand.strain_zero_height), 100.0 * *until.strain));
+    if (until.strain && !stand.strain_zero_height) parts.push_back("strain has not begun to count");
+    if (until.porosity) parts.push_back(fmt::format("porosity {:.3f} (wanted: {:.3f})", m.porosity, *until.porosity));
+    if (until.drop) parts.push_back(fmt::format("stress {}: no drop by {:.0f} % yet", pretty(m.stress_top, "Pa"), 100.0 * *until.drop));
   }
   return fmt::format("{}", fmt::join(parts, "; "));
 }

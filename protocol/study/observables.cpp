@@ -207,7 +207,6 @@ void measure_crush(const SeriesTable& series, const Case& c, RunMeasures& out) {
   const StageRows release = rows_of(series, first_stage(c, StageKind::release));
   if (!release.empty()) {
     put(out, "coordination_released", release.coordination.back());
-    put(out, "porosity_released", release.porosity.back());
     put(out, "stress_bottom_released", at_end(release, release.stress_bottom));
   }
   const std::string name = first_stage(c, StageKind::crush);
@@ -276,7 +275,6 @@ const std::vector<ScalarKind>& scalar_kinds() {
       {"porosity_residual", "-", "porosity after unloading"},
       {"coordination_unloaded", "-", "coordination number after unloading"},
       {"coordination_released", "-", "coordination number at rest without sides"},
-      {"porosity_released", "-", "porosity at rest without sides"},
       {"strength", "Pa", "unconfined strength, the largest stress of the crushing"},
       {"strength_strain", "-", "strain at the strength"},
       {"initial_stiffness", "Pa", "largest tangent below half the strength"},

@@ -383,7 +383,9 @@ bool holds_another(const fs::path& study_folder, const Job& job) {
   if (job.match && !job.match->met) return false;  // its case is not known yet
   const fs::path folder = run_folder(study_folder, job);
   std::error_code ignored;
-  return fs::is_regular_file(folder / "summary.json", ignored) && text_of(folder / "case.toml") != job.c.text;
+  if (!fs::is_regular_file(folder / "summary.json", ignored) || text_of(folder / "case.toml") == job.c.text) return false;
+  const nlohmann::json summary = nlohmann::json::parse(text_of(folder / "summary.json"), nullptr, false);
+  return summary.is_object() && summary.value("exit_code", -1) == 0;
 }
 
 std::vector<JobOutcome> run_jobs(StudyPlan& plan, const RunnerOptions& options) {

@@ -194,14 +194,14 @@ void judge_figures_8_10(Judge& judge) {
         judge.part().plan->base.particles.law.f0 *
         std::pow(curve->planned->radius / judge.part().plan->reference_radius, curve->planned->powers.adhesion);
     const double d = 2.0 * curve->planned->radius;
-    const double x = Judge::mean(curve, "coordination_released") * (1.0 - Judge::mean(curve, "porosity_released"));
+    const double x = Judge::mean(curve, "coordination_released") * (1.0 - Judge::mean(curve, "porosity_residual"));
     const double y = Judge::mean(curve, "strength") * d * d / std::abs(f0);
     if (!std::isfinite(x + y)) continue;
     packing.push_back(x);
     strength.push_back(y);
   }
   const std::string rumpf = "Rumpf: correlation over all curves of strength d^2/|f0| with CN (1 - porosity)";
-  if (packing.size() < 3) return judge.missing("10", rumpf);
+  if (packing.size() < 3 || !judge.plain_are_there()) return judge.missing("10", rumpf);
   const double mx = mean_of(packing), my = mean_of(strength);
   double xy = 0.0, xx = 0.0, yy = 0.0;
   for (std::size_t k = 0; k < packing.size(); ++k) {
