@@ -96,6 +96,18 @@ TEST(CaseStages, NoStages) {
   expect_error("stage = []\n" + without, "case.toml:1:9: stage: there are no stages");
 }
 
+TEST(CaseStages, PorosityNeedsSides) {
+  const std::string press = "[[stage]]\nkind = \"compress\"\nspeed = 0.01\nuntil = { porosity = 0.4 }\n";
+  const Case c = parse_case(good_case, "case.toml", ".", {"stage.compress.until.porosity=0.4"});
+  EXPECT_EQ(c.stages.at(1).until.porosity, 0.4);
+  try {
+    parse_case(good_case + "[[stage]]\nkind = \"release\"\n" + press, "case.toml", ".", {});
+    ADD_FAILURE() << "was taken";
+  } catch (const CaseError& error) {
+    EXPECT_NE(std::string(error.what()).find("until.porosity needs sides"), std::string::npos) << error.what();
+  }
+}
+
 TEST(CaseStages, KeysOfAnotherKind) {
   refused("[[stage]]\nkind = \"settle\"\nspeed = 1\n",
           "23:1: stage.settle.speed: unknown key; allowed in a settle stage: kind, name, max_duration, frames, until");

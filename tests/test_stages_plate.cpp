@@ -58,6 +58,15 @@ TEST(Compress, StrainCountsFromItsZero) {
   EXPECT_NEAR(strain.at(rows.front()), 1.0 - run.at(rows.front(), "height") / h0, 1e-15);
 }
 
+TEST(Crush, ProfilesKnowContactsButNoPorosity) {
+  const Trial& run = protocol_run();
+  const ResultsFile file(run.path() / "results.h5");
+  const auto porosity = file.doubles("/profiles/crush/porosity"), contacts = file.doubles("/profiles/crush/coordination_number");
+  for (const double value : porosity.values) EXPECT_TRUE(std::isnan(value));
+  EXPECT_TRUE(std::any_of(contacts.values.begin(), contacts.values.end(), [](double z) { return z > 1.0; }));
+  for (const double value : file.doubles("/profiles/compress/porosity").values) EXPECT_FALSE(std::isnan(value));
+}
+
 TEST(Compress, QuantitiesFollowTheirDefinitions) {
   const Trial& run = protocol_run();
   const double R = 0.0025, solid = 250 * 4.0 / 3.0 * M_PI * R * R * R, area = 9e-4;
