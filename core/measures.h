@@ -61,7 +61,7 @@ struct Profile {
 double sphere_segment_volume(double R, double z, double a, double b);
 
 // Porosity and coordination number in `slabs` equal slabs between snapshot.z_bottom and snapshot.z_top over the area
-// width x depth [m2].
+// width x depth [m2]. Porosities are no numbers where the area is none.
 Profile profile(const Snapshot& snapshot, double area, int slabs);
 
 // 1 - V_s / (area * (z_top - z_bottom)), full sphere volumes [A28].

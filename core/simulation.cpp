@@ -139,6 +139,7 @@ void Simulation::setup_laws(const SimulationSetup& setup) {
   const double beta = std::sqrt(c.damping * (0.5 * heaviest) * (n * c.k1 * std::pow(deep, n - 1.0)));
   const double F = power_of_two_above(std::max(c.k2, c.k_adh) * s + std::fabs(c.f0) + beta * fastest);
   c.force = {1.5 * 0x1p52 * (F * most * 0x1p-53), F, 1.0 / (F * most * 0x1p-53)};
+  most_push_ = 0.25 * F * most;
   const double E = power_of_two_above(F * R), q = E * chunk_size * 0x1p-53;
   c.energy = {1.5 * 0x1p52 * q, E, 1.0 / q};
   // Forces are compared with F where overlaps are above R/2, a lever of 3/4. At smaller ones springs give less than 2.3 F,
@@ -260,9 +261,7 @@ void Simulation::integrate(Batch& b, const MotionConstants& c) {
   b.rolling += totals.rolling;
   b.out_of_range = b.out_of_range || totals.out_of_range;
   // Pairs far faster than R omega give more than sums hold exactly before they overlap deeply: it shows in a sphere's sum.
-  // A quarter of what sums hold: 4 F for equal spheres, more where a large one may have many small neighbours.
-  const double most = 0.25 * 0x1p53 / law_.force.inverse;
-  if (!(totals.strongest < most * most)) b.out_of_range = b.out_of_range || !pairs_within(b, most);
+  if (!(totals.strongest < most_push_ * most_push_)) b.out_of_range = b.out_of_range || !pairs_within(b, most_push_);
 }
 
 // Whether pairs push every sphere of a batch with less than `most` [N]; plates and walls may push harder. Only spheres that

@@ -189,6 +189,7 @@ class Simulation {
   MotionConstants motion_{};
   double solid_volume_ = 0.0;      // of all spheres [m3]
   double energy_unit_ = 0.0;       // of stored and kinetic energies [J]
+  double most_push_ = 0.0;         // of pairs on a sphere, a quarter of what sums hold: 4 F for equal spheres [N]
   double plate_force_unit_ = 0.0;  // [N]
   double largest_radius_ = 0.0, smallest_radius_ = 0.0, smallest_mass_ = 0.0;
 

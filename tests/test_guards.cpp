@@ -15,6 +15,16 @@ using namespace test;
 
 constexpr double inf = std::numeric_limits<double>::infinity(), nan = std::numeric_limits<double>::quiet_NaN();
 
+// What the engine says while it goes on; "" where nothing is wrong.
+std::string said_by(Simulation& sim, std::int64_t steps) {
+  try {
+    sim.advance(steps);
+  } catch (const RunError& error) {
+    return error.what();
+  }
+  return "";
+}
+
 // What the engine says when `fault` has been put into a bed at step 20; "" where it goes on as if nothing were wrong.
 // A running Simulation cannot be written to from outside; only this test does so.
 template <class Fault>
@@ -31,12 +41,7 @@ std::string said_after(InstructionSet set, int threads, const Fault& fault, cons
   while (state.id_of_rank[static_cast<std::size_t>(state.rank[static_cast<std::size_t>(k)])] != 73) ++k;
   fault(const_cast<Particles&>(state), const_cast<std::vector<Batch>&>(sim.batches()), static_cast<std::size_t>(k));
   const_cast<Particles&>(state).write_rows();  // they are what a run goes back to
-  try {
-    sim.advance(32);
-  } catch (const RunError& error) {
-    return error.what();
-  }
-  return "";
+  return said_by(sim, 32);
 }
 
 void expect_named(const std::string& said, const std::string& what) {
@@ -103,12 +108,7 @@ TEST(Guards, OverlapsAboveR) {
     options.spacing = 0.9;
     Simulation sim(scenes::bed(options, scenes::full_law(), engine));
     sim.set_time_step(2e-6);
-    std::string said;
-    try {
-      sim.advance(1);
-    } catch (const RunError& error) {
-      said = error.what();
-    }
+    const std::string said = said_by(sim, 1);
     EXPECT_NE(said.find("forces out of range at step 0"), std::string::npos) << said;
     EXPECT_NE(said.find("; spheres "), std::string::npos) << said;
     for (const char* what : {" overlap by 1.", " R (plastic ", "approach at ", "push with ", "a smaller time step"}) EXPECT_NE(said.find(what), std::string::npos) << said;
@@ -144,17 +144,12 @@ TEST(Guards, AnImpactThatNoSphereSurvives) {
     setup.spheres.radius = {R, R}, setup.spheres.density = {2000.0, 2000.0};
     Simulation sim(setup);
     sim.set_time_step(1e-9);
-    std::string said;
-    try {
-      sim.advance(4);
-    } catch (const RunError& error) {
-      said = error.what();
-    }
+    const std::string said = said_by(sim, 4);
     EXPECT_NE(said.find("out of range at step "), std::string::npos) << to_string(set) << said;
   }
 }
 
-// A sphere that a plate stops hard is no fault, and does not make one of another that pairs and a plate hold in balance.
+// A sphere that a plate stops hard is no fault: only what pairs push with has the limit.
 TEST(Guards, APlateMayPushHarderThanPairs) {
   for (const int batch : {0, 8}) {
     EngineOptions engine;
@@ -213,12 +208,7 @@ TEST(Guards, AForceOfADeepOverlapBeyondItsBound) {
     law.k1 = law.k2 = 31.0 / (0.5 * options.R);  // 31 N at R/2, so the bound is 32 N; 56 N at 0.9 R
     Simulation sim(scenes::bed(options, law, engine));
     sim.set_time_step(1e-9);
-    std::string said;
-    try {
-      sim.advance(1);
-    } catch (const RunError& error) {
-      said = error.what();
-    }
+    const std::string said = said_by(sim, 1);
     EXPECT_NE(said.find("forces out of range at step 0"), std::string::npos) << to_string(set) << said;
     EXPECT_NE(said.find(" overlap by 0.9"), std::string::npos) << said;
   }

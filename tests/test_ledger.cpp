@@ -35,7 +35,7 @@ TEST(Ledger, ClosesAtEveryStageEndOfTheQuickCase) {
 }
 
 // A sphere held by cohesion between two heavy ones spins about the line between them and rolls to and fro: no dashpot, no
-// slip, nothing from outside. With the present normal instead of that of half a step ago it loses several per cent in this second.
+// slip, nothing from outside. With the present normal instead of that of half a step ago it would not keep its energy.
 TEST(Ledger, ASphereThatSpinsBetweenTwoOthersKeepsItsEnergy) {
   for (const bool unequal : {false, true}) {  // kernels for equal spheres hold one mass: the heavy ones make it the others
     SimulationSetup setup;

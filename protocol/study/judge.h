@@ -1,8 +1,8 @@
 // What the statements are made of: finding curves by their powers, numbers with their scatter, bands.
 #pragma once
 
-#include <limits>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
