@@ -17,3 +17,6 @@ pkg_check_modules(HDF5 REQUIRED IMPORTED_TARGET hdf5-serial)
 set(HDF5_C_LIBRARIES PkgConfig::HDF5)
 find_library(UDUNITS2_LIBRARY udunits2 REQUIRED)
 find_library(XXHASH_LIBRARY xxhash REQUIRED)
+
+# Scripts of the report's page.
+set(PLATEN_JAVASCRIPT "/usr/share/javascript" CACHE PATH "Folder with chart.js/ and three/")

@@ -81,16 +81,6 @@ std::string describe_hdf5(const fs::path& path, bool json) {
 
 // ---- run folders ----------------------------------------------------------------------------------------------------
 
-// The title alone: particle files that the case names may be elsewhere by now.
-std::string title_of(const fs::path& case_file) {
-  try {
-    const toml::table table = toml::parse(read_whole_file(case_file));
-    return table["case"]["title"].value_or(std::string());
-  } catch (const toml::parse_error& error) {
-    throw OutputError(case_file.string() + ": " + std::string(error.description()));
-  }
-}
-
 double number(const Json& object, const char* key) { return object.value(key, StageLine::none); }
 
 std::vector<StageLine> lines_of_summary(const Json& summary) {
@@ -173,12 +163,12 @@ std::string state_of(const Json& summary, const fs::path& case_file) {
 }
 
 std::string describe_run(const fs::path& folder, bool json) {
-  const std::string title = title_of(folder / "case.toml");
+  const std::string title = run_title(folder);
   const bool finished = fs::exists(folder / "summary.json");
   if (!finished) {
     const std::vector<StageLine> lines = lines_of_series(folder);
     if (!json) return fmt::format("run      {}\ntitle    {}\nstate    {}\n\n{}", folder.string(), title,
-                                  RunFolder::in_use(folder) ? "running" : "not finished, and nobody works on it: it was killed", stage_table(lines));
+                                  run_state(folder).text, stage_table(lines));
     Json result = {{"kind", "run"}, {"folder", folder.string()}, {"title", title}, {"finished", false}};
     result["stages"] = Json::array();
     for (const StageLine& line : lines) {
@@ -203,7 +193,7 @@ std::string describe_run(const fs::path& folder, bool json) {
   }
   try {
     return fmt::format("run      {}\ntitle    {}\nversion  platen {}\nstate    {}\nhash     {}\n\n{}",
-                       folder.string(), title, summary.at("version").get<std::string>(), state_of(summary, folder / "case.toml"), summary.value("state_hash", "none"),
+                       folder.string(), title, summary.at("version").get<std::string>(), run_state(folder).text, summary.value("state_hash", "none"),
                        stage_table(lines_of_summary(summary)));
   } catch (const Json::exception& error) {
     throw OutputError((folder / "summary.json").string() + ": " + error.what());
@@ -211,6 +201,30 @@ std::string describe_run(const fs::path& folder, bool json) {
 }
 
 }  // namespace
+
+RunState run_state(const fs::path& folder) {
+  if (!fs::exists(folder / "summary.json")) {
+    const bool running = RunFolder::in_use(folder);
+    return {running ? "running" : "not finished, and nobody works on it: it was killed", running};
+  }
+  const Json summary = read_summary(folder / "summary.json");
+  try {
+    return {state_of(summary, folder / "case.toml"), summary.at("exit_code").get<int>() == exit_done};
+  } catch (const Json::exception& error) {
+    throw OutputError((folder / "summary.json").string() + ": " + error.what());
+  }
+}
+
+// The title alone: particle files that the case names may be elsewhere by now.
+std::string run_title(const fs::path& folder) {
+  const fs::path case_file = folder / "case.toml";
+  try {
+    const toml::table table = toml::parse(read_whole_file(case_file));
+    return table["case"]["title"].value_or(std::string());
+  } catch (const toml::parse_error& error) {
+    throw OutputError(case_file.string() + ": " + std::string(error.description()));
+  }
+}
 
 std::string describe(const fs::path& path, bool json) {
   std::error_code ignored;

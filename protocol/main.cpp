@@ -25,6 +25,7 @@
 #include "protocol/law_command.h"
 #include "protocol/output/output_error.h"
 #include "protocol/progress.h"
+#include "protocol/report_command.h"
 #include "protocol/run_command.h"
 #include "protocol/study_command.h"
 #include "protocol/units.h"
@@ -99,6 +100,7 @@ Command add_run(CLI::App& program) {
   app->add_option("--stop-after", command->stop_after, "end after this stage, by name or number")->type_name("STAGE");
   app->add_flag("--reproducible", command->reproducible, "the same bits on every instruction set; somewhat slower");
   app->add_flag("--force", command->force, "replace the run that is in the folder");
+  app->add_flag("!--no-report", command->report, "write no report.html");
   app->add_flag("--json", command->json, "print the summary as JSON");
   app->add_flag("-q,--quiet", command->quiet, "print nothing but errors");
   return {app, "platen run protocol/cases/quick.toml -o runs/first --set stage.compress.speed='\"20 mm/s\"'", [=] {
@@ -172,6 +174,15 @@ Command add_study(CLI::App& program) {
           }};
 }
 
+Command add_report(CLI::App& program) {
+  CLI::App* app = program.add_subcommand("report", "write a page with the curves and the bed of a run, or compare several");
+  auto command = std::make_shared<ReportCommand>();
+  app->add_option("DIR", command->folders, "run folders")->type_name("DIR")->required();
+  app->add_option("-o,--output", command->output, "the page (default: report.html in the folder; of several, here)")->type_name("FILE");
+  app->add_flag("-q,--quiet", command->quiet, "print nothing but errors");
+  return {app, "platen report runs/soft runs/stiff -o comparison.html", [=] { return report_command(*command); }};
+}
+
 Command add_info(CLI::App& program) {
   CLI::App* app = program.add_subcommand("info", "say what is in a run folder, an HDF5 file or a case file");
   auto path = std::make_shared<std::filesystem::path>();
@@ -197,7 +208,7 @@ int run_program(int argc, char** argv) {
   program.require_subcommand(1);
   program.footer("platen COMMAND --help explains a command.");
   const std::vector<Command> commands = {add_run(program), add_check(program), add_law(program), add_study(program),
-                                         add_info(program)};
+                                         add_report(program), add_info(program)};
   for (const Command& command : commands) command.app->footer(std::string("Example:\n  ") + command.example);
 
   if (argc == 1) {

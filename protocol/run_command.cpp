@@ -12,6 +12,7 @@
 #include "protocol/experiment.h"
 #include "protocol/output.h"
 #include "protocol/progress.h"
+#include "protocol/report_command.h"
 #include "protocol/stop_signals.h"
 #include "protocol/units.h"
 #include "protocol/usable_cores.h"
@@ -101,11 +102,24 @@ int run_command(const RunCommand& command) {
 
   const RunOutcome outcome = run_experiment(c, folder, options);
   printer.clear();
+  // Whatever the page lacks, the run is done and stands in its files.
+  bool reported = command.report;
+  if (reported && fs::exists(path / "report.html")) {  // that of a former run is gone by now
+    reported = false;
+    spdlog::warn("{}: is yours and stays; `platen report` writes one elsewhere", (path / "report.html").string());
+  }
+  if (reported) try {
+    write_report(path);
+  } catch (const std::exception& error) {
+    reported = false;
+    spdlog::warn("no report.html: {}", error.what());
+  }
   if (command.json) {
     print(read_whole_file(path / "summary.json"));
   } else if (!command.quiet) {
     print(summary_table(outcome.stages));
     print(fmt::format("results: {} (results.h5, series.csv, summary.json)\n", path.string()));
+    if (reported) print(fmt::format("report: {}\n", (path / "report.html").string()));
     if (outcome.exit_code == exit_done) print(fmt::format("state hash: {:016x}\n", outcome.state_hash));
   }
   report_end(outcome, path, command.quiet);

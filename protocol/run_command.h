@@ -19,6 +19,7 @@ struct RunCommand {
   std::string stop_after;               // stage by name, or by number from 1
   bool reproducible = false;
   bool force = false;                   // replace a run that is in the folder
+  bool report = true;                   // report.html at the end
   bool json = false;                    // the summary as JSON on standard output instead of the table
   bool quiet = false;                   // nothing but errors
 };
