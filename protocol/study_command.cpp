@@ -8,8 +8,10 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <set>
 #include <thread>
 
@@ -44,6 +46,14 @@ std::string plan_table(const StudyPlan& plan, const fs::path& folder) {
   return out;
 }
 
+// Whether the process whose number is in the file lives. Also yes where there is none.
+bool alive(int file) {
+  char text[32] = "";
+  if (::pread(file, text, sizeof text - 1, 0) <= 0) return true;
+  const long process = std::strtol(text, nullptr, 10);
+  return process <= 0 || ::kill(static_cast<pid_t>(process), 0) == 0 || errno != ESRCH;
+}
+
 // Keeps a second study out of the folder; falls with the process.
 UniqueFd lock(const fs::path& folder) {
   std::error_code error;
@@ -52,12 +62,15 @@ UniqueFd lock(const fs::path& folder) {
   const fs::path file = folder / ".lock";
   UniqueFd fd(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
   if (fd.get() < 0) throw system_error(file, "cannot open", errno);
-  // A child of a study that was killed just now holds the lock until it begins the run, which it then does not begin.
+  // A child of a study that was killed just now holds the lock until it begins the run, which it then does not begin. That
+  // takes long where the machine is busy, so a study that lives is told from one that does not by its number in the file.
   for (int k = 0; ::flock(fd.get(), LOCK_EX | LOCK_NB) != 0; ++k) {
     if (errno != EWOULDBLOCK) throw system_error(file, "cannot lock", errno);
-    if (k == 200) throw OutputError(folder.string() + ": another process works in this folder");
+    if (k >= 200 && (k == 3000 || alive(fd.get()))) throw OutputError(folder.string() + ": another process works in this folder");
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
+  const std::string own = std::to_string(::getpid()) + "\n";
+  if (::ftruncate(fd.get(), 0) != 0 || ::pwrite(fd.get(), own.data(), own.size(), 0) < 0) errno = 0;  // the lock works without it
   return fd;
 }
 
