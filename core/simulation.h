@@ -69,6 +69,8 @@ struct SimulationSetup {
   EngineOptions engine;
 };
 
+struct SimulationState;  // core/simulation_state.h
+
 struct EngineCounters {
   std::int64_t rebuilds = 0, prunes = 0, redone_steps = 0;
   int batches = 0;
@@ -127,6 +129,11 @@ class Simulation {
   double smallest_radius() const { return smallest_radius_; }
   double smallest_mass() const { return smallest_mass_; }
 
+  // Everything that is needed to go on with the same bits, and going on from it: on a Simulation that was set up with the same
+  // laws, ids, radii and densities and has made no step. Throws std::invalid_argument for a state of other spheres.
+  SimulationState whole_state();
+  void take_up(const SimulationState& state);
+
   // For tests and benches: the lists and tasks as they are.
   const std::vector<Batch>& batches() const { return batches_; }
   const Particles& state() const { return particles_; }
@@ -148,6 +155,8 @@ class Simulation {
   void collect();
   void rebuild();
   void rebuild_with(const PairHistories& pairs);
+  void rebuild_from(const PairHistories& pairs, const std::vector<PlateHistory>& plates, const AlignedArray<double>* sums);
+  void take_sides_away();
   void prune_lists();
   void merge_all();
   void keep_sums(AlignedArray<double>& sums);

@@ -250,7 +250,11 @@ void Simulation::rebuild_with(const PairHistories& pairs) {
   AlignedArray<double> sums;
   const bool had_forces = !batches_.empty();
   if (had_forces) keep_sums(sums);
-  const auto plates = plate_history(batches_, particles_);
+  rebuild_from(pairs, plate_history(batches_, particles_), had_forces ? &sums : nullptr);
+}
+
+// `sums`: forces by rank; null where there are none yet.
+void Simulation::rebuild_from(const PairHistories& pairs, const std::vector<PlateHistory>& plates, const AlignedArray<double>* sums) {
   const auto run = [this](int count, const std::function<void(int)>& body) { parallel(count, body); };
   const bool even = engine_.threads == 2 && work_is_even(batches_, engine_.threads);
   particles_.permute(morton_order(particles_));
@@ -263,7 +267,7 @@ void Simulation::rebuild_with(const PairHistories& pairs) {
   fill_inner(batches_, particles_, domain_, inner_, keeps_k_t(), pairs, run);
   list_plates(batches_, particles_, planes_, step_, inner_, plate_gap_, plates, run);
   merged_.assign(batches_.size(), 1);
-  if (had_forces) put_sums(sums);
+  if (sums != nullptr) put_sums(*sums);
   // The graph is as long as a usual run between two looks.
   unroll_ = engine_.unroll;
   prepare_graph();
@@ -279,6 +283,12 @@ void Simulation::rebuild_now() {
   const FloatMode mode;
   ensure_forces();
   rebuild();
+}
+
+void Simulation::take_sides_away() {
+  domain_ = {};
+  law_.width = law_.depth = law_.inverse_width = law_.inverse_depth = 0.0;
+  motion_.width = motion_.depth = 0.0;
 }
 
 void Simulation::open_sides() {
@@ -301,9 +311,7 @@ void Simulation::open_sides() {
     }
     kept.start.push_back(static_cast<std::int32_t>(kept.pairs.size()));
   }
-  domain_ = {};
-  law_.width = law_.depth = law_.inverse_width = law_.inverse_depth = 0.0;
-  motion_.width = motion_.depth = 0.0;
+  take_sides_away();
   rebuild_with(kept);
   add_pair_energy(after);
   removed_ += before.value() - after.value();

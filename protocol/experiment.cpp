@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "protocol/checkpoint_fields.h"
 #include "protocol/guards.h"
 #include "protocol/stages.h"
 
@@ -15,6 +16,7 @@ namespace platen {
 
 namespace {
 
+constexpr const char* no_checkpoint = "a checkpoint could not be written: log.jsonl says why";
 constexpr std::int64_t limits_every = 8192;  // steps between two looks at the limits of the time step
 
 double now() {
@@ -23,17 +25,25 @@ double now() {
 
 class Experiment {
  public:
-  Experiment(const Case& c, RunFolder& folder, const RunOptions& options)
-      : c_(c), folder_(folder), options_(options), wall_begin_(now()) {}
+  Experiment(const Case& c, RunFolder& folder, const RunOptions& options, const Checkpoint* from)
+      : c_(c), folder_(folder), options_(options), from_(from), process_begin_(now()), wall_begin_(process_begin_), kept_at_(process_begin_) {}
 
   RunOutcome run() {
     RunOutcome outcome;
     try {
-      sim_ = make_simulation(c_, options_.threads, options_.reproducible);
+      std::size_t first = 0;
+      if (from_ == nullptr) {
+        sim_ = make_simulation(c_, options_.threads, options_.reproducible);
+        farthest_allowed_ = 1000.0 * size_of_space(c_, *sim_);
+        free_ = first_step(c_).limits;
+        density_ = c_.particles.table ? c_.particles.table->density.front() : c_.particles.density;
+      } else {
+        sim_ = make_simulation(c_, *from_, options_.threads);
+        first = take_up();
+      }
       describe_run();
-      farthest_allowed_ = 1000.0 * size_of_space(c_, *sim_);
-      for (std::size_t k = 0; k < c_.stages.size(); ++k) {
-        const End end = run_stage(k);
+      for (std::size_t k = first; k < c_.stages.size(); ++k) {
+        const End end = run_stage(k, from_ != nullptr && k == first && stage_open_);
         if (end == End::goal_missed) {
           outcome.exit_code = exit_goal;
           outcome.message = fmt::format("stage {}: {}", closed_.back().name, closed_.back().end_reason);
@@ -44,12 +54,17 @@ class Experiment {
           outcome.message = fmt::format("stopped in stage {}: {}", closed_.back().name, closed_.back().end_reason);
           break;
         }
-        if (c_.stages[k].name == options_.stop_after) break;
+        if (c_.stages[k].name == options_.stop_after && k + 1 < c_.stages.size()) {
+          keep_between(k + 1);
+          break;
+        }
       }
       outcome.state_hash = sim_->state_hash(stage_state());
+      if (outcome.exit_code == exit_done && closed_.size() == c_.stages.size()) remove_checkpoints(folder_.path());  // nothing is left to do
     } catch (const RunError& error) {
       outcome.exit_code = exit_numerical;
       outcome.message = error.what();
+      if (kept_step_) outcome.message += fmt::format("; the last checkpoint is that of step {}", *kept_step_);
       if (!closed_.empty() || stage_open_) {
         StageResult failed = current_;
         failed.end_reason = "failed";
@@ -78,9 +93,84 @@ class Experiment {
     info.scene = built_scenes[static_cast<std::size_t>(kernels.scene)].name;
     info.contacts = c_.output.contacts;
     folder_.set_info(info);
-    folder_.log("start", {{"title", c_.title}, {"spheres", static_cast<std::int64_t>(sim_->particles())},
+    folder_.log(from_ ? "resume" : "start", {{"title", c_.title}, {"spheres", static_cast<std::int64_t>(sim_->particles())},
                           {"threads", options_.threads}, {"instruction_set", info.instruction_set}, {"scene", info.scene},
-                          {"dt", sim_->time_step()}});
+                          {"dt", sim_->time_step()}, {"step", sim_->step()}});
+  }
+
+  // ---- checkpoints --------------------------------------------------------------------------------------------------
+  // Taken right after steps and before anything looks at them, so that a run that goes on from one looks first.
+
+  // All that the stages know, for writing and for reading.
+  template <class V>
+  void each_field(V& v) {
+    v("wall_seconds", wall_seconds_), v("farthest_allowed", farthest_allowed_), v("density", density_);
+    v("free_dt_crit", free_.dt_crit), v("free_dt_pairs", free_.dt_pairs), v("free_dt_limit", free_.dt_limit);
+    v("closed", closed_), v("current", current_), v("stage_open", stage_open_), v("strain_zero_height", strain_zero_height_);
+    v("last_wanted", last_wanted_), v("looked_stress", looked_stress_), v("looked_contacts", looked_contacts_);
+  }
+
+  bool checkpoint_is_due() const {
+    if (options_.checkpoint_signal && options_.checkpoint_signal->load() != checkpoints_asked_) return true;
+    if (!(c_.output.checkpoint > 0.0)) return false;
+    // Never more than a twentieth of the time for them.
+    return now() - kept_at_ > std::max(c_.output.checkpoint, 20.0 * keeping_takes_);
+  }
+
+  void keep(nlohmann::json stage) {
+    const double begin = now();
+    if (options_.checkpoint_signal) checkpoints_asked_ = options_.checkpoint_signal->load();
+    folder_.sync();
+    wall_seconds_ = begin - wall_begin_;
+    nlohmann::json experiment = nlohmann::json::object();
+    fields::Writer writer{experiment};
+    each_field(writer);
+    experiment["rows"] = folder_.rows();
+    experiment["stage"] = std::move(stage);
+    Checkpoint checkpoint;
+    checkpoint.bed = sim_->whole_state();
+    checkpoint.experiment = experiment.dump();
+    checkpoint.instruction_set = to_string(sim_->kernels().instruction_set);
+    checkpoint.reproducible = from_ ? from_->reproducible : options_.reproducible;
+    if (from_) checkpoint.density = from_->density;
+    else if (c_.particles.table) checkpoint.density = densities_by_id(*c_.particles.table);
+    else checkpoint.density = {c_.particles.density};
+    try {
+      write_checkpoint(folder_.path(), checkpoint);
+      kept_step_ = sim_->step();
+      folder_.log("checkpoint", {{"step", sim_->step()}, {"seconds", now() - begin}});
+    } catch (const OutputError& error) {  // the run itself can go on, with the older one
+      folder_.log("checkpoint failed", {{"message", error.what()}}, LogLevel::warning);
+      if (std::find(current_.warnings.begin(), current_.warnings.end(), no_checkpoint) == current_.warnings.end()) current_.warnings.push_back(no_checkpoint);
+    }
+    kept_at_ = now(), keeping_takes_ = kept_at_ - begin;
+  }
+
+  void keep_between(std::size_t next) { keep({{"index", next}}); }
+
+  static std::vector<double> densities_by_id(const ParticleTable& t) {
+    std::vector<std::size_t> order(t.size());
+    for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
+    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return t.id[a] < t.id[b]; });
+    std::vector<double> density;
+    for (const std::size_t k : order) density.push_back(t.density[k]);
+    return density;
+  }
+
+  // From the checkpoint; returns the stage to go on with.
+  std::size_t take_up() {
+    try {
+      kept_ = nlohmann::json::parse(from_->experiment);
+      fields::Reader reader{kept_};
+      each_field(reader);
+      const auto index = kept_.at("stage").at("index").get<std::size_t>();
+      if (index >= c_.stages.size() || (stage_open_ && c_.stages[index].name != current_.name)) throw OutputError("the checkpoint does not fit the case: it has other stages");
+      wall_begin_ = process_begin_ - wall_seconds_;
+      kept_step_ = sim_->step();
+      return index;
+    } catch (const nlohmann::json::exception& error) {
+      throw OutputError(std::string("the checkpoint does not fit this version of platen: ") + error.what());
+    }
   }
 
   Performance performance() const {
@@ -110,8 +200,7 @@ class Experiment {
     // I = strain rate * d * sqrt(rho/p) [A34]; no meaning without pressure.
     row.inertial_number = std::numeric_limits<double>::quiet_NaN();
     if (m.stress_top > 0.0 && m.height > 0.0) {
-      const double rho = c_.particles.table ? c_.particles.table->density.front() : c_.particles.density;
-      row.inertial_number = speed / m.height * 2.0 * sim_->mean_radius() * std::sqrt(rho / m.stress_top);
+      row.inertial_number = speed / m.height * 2.0 * sim_->mean_radius() * std::sqrt(density_ / m.stress_top);
     }
     if (!c_.output.energy) {
       const double none = std::numeric_limits<double>::quiet_NaN();
@@ -168,7 +257,7 @@ class Experiment {
       return;
     }
     StepLimits ruling = limits;
-    const StepLimits free = first_step(c_).limits;
+    const StepLimits& free = free_;
     // A loose bed says nothing of the dense one that it is about to become.
     if (m.coordination_number < 3.0) ruling.dt_pairs = std::min(ruling.dt_pairs, free.dt_pairs), ruling.dt_limit = std::min(ruling.dt_limit, free.dt_limit);
     const StageKind kind = current_.kind;
@@ -191,33 +280,76 @@ class Experiment {
   // Why the run must stop now, if it must.
   std::optional<std::string> stop_request() const {
     if (options_.stop_signal && options_.stop_signal->load() != 0) return fmt::format("signal {}{}", options_.stop_signal->load(), options_.stop_signal->load() == SIGINT ? " (Ctrl-C)" : "");
-    if (options_.max_walltime && now() - wall_begin_ > *options_.max_walltime)
+    if (options_.max_walltime && now() - process_begin_ > *options_.max_walltime)
       return fmt::format("wall time of {:.4g} s is over", *options_.max_walltime);
     return std::nullopt;
   }
 
-  End run_stage(std::size_t index) {
+  // A stage at work, besides its own struct.
+  struct Course {
+    double begun = 0.0;  // wall clock [s]
+    double residual_before = 0.0, dissipated_before = 0.0;  // [J]
+    std::int64_t next_sample = 0;
+  };
+
+  template <class V>
+  static void each_field(V& v, Stand& stand, Stage& stage, Course& course, double& elapsed) {
+    v("first_step", stand.first_step), v("first_time", stand.first_time), v("strain_zero_height", stand.strain_zero_height), v("dt_step", stand.dt_step), v("dt_time", stand.dt_time);
+    v("elapsed", elapsed), v("residual_before", course.residual_before), v("dissipated_before", course.dissipated_before), v("next_sample", course.next_sample);
+    std::visit([&](auto& s) { v("memory", s); }, stage);
+  }
+
+  void keep_within(std::size_t index, Stand& stand, Stage& stage, Course& course) {
+    nlohmann::json state = {{"index", index}};
+    fields::Writer writer{state};
+    double elapsed = now() - course.begun;
+    each_field(writer, stand, stage, course, elapsed);
+    keep(std::move(state));
+  }
+
+  Course begin_stage(std::size_t index, Stand& stand, Stage& stage) {
     const StageSpec& spec = c_.stages[index];
-    const double stage_begin = now();
+    Course course;
+    course.begun = now();
     current_ = StageResult{};
     current_.name = spec.name, current_.kind = spec.kind;
     current_.first_step = sim_->step(), current_.time_begin = sim_->time();
     current_.particles = sim_->particles();
     stage_open_ = true;
     last_wanted_.reset();
-
-    Stand stand{*sim_, c_, spec, sim_->step(), sim_->time(), strain_zero_height_, sim_->step(), 0.0};
-    Stage stage = make_stage(spec);
     std::visit([&](auto& s) { s.begin(stand); }, stage);
     if (spec.kind == StageKind::vibrate || spec.kind == StageKind::release) stand.strain_zero_height.reset();  // another bed
     strain_zero_height_ = stand.strain_zero_height;
     if (spec.kind == StageKind::crush && sim_->confined()) warn("the sides are still there: its strength is not an unconfined one; a stage `release` takes them away");
-    const double speed = spec.speed;
-    sample(index, speed);
-    const double residual_before = current_.last.measures.energy_residual, dissipated_before = current_.last.measures.ledger.dissipated();
+    sample(index, spec.speed);
+    course.residual_before = current_.last.measures.energy_residual, course.dissipated_before = current_.last.measures.ledger.dissipated();
+    course.next_sample = sim_->step() + steps_to_sample();
+    return course;
+  }
+
+  Course go_on_with_stage(Stand& stand, Stage& stage) {
+    Course course;
+    double elapsed = 0.0;
+    try {
+      fields::Reader reader{kept_.at("stage")};
+      each_field(reader, stand, stage, course, elapsed);
+    } catch (const nlohmann::json::exception& error) {
+      throw OutputError(std::string("the checkpoint does not fit this version of platen: ") + error.what());
+    }
+    course.begun = now() - elapsed;
+    return course;
+  }
+
+  // `on_the_way`: the checkpoint is one within this stage.
+  End run_stage(std::size_t index, bool on_the_way) {
+    const StageSpec& spec = c_.stages[index];
+    Stand stand{*sim_, c_, spec, sim_->step(), sim_->time(), strain_zero_height_, sim_->step(), 0.0};
+    Stage stage = make_stage(spec);
+    Course course = on_the_way ? go_on_with_stage(stand, stage) : begin_stage(index, stand, stage);
+    const double speed = spec.speed, stage_begin = course.begun, residual_before = course.residual_before, dissipated_before = course.dissipated_before;
+    std::int64_t& next_sample = course.next_sample;
 
     End end = End::done;
-    std::int64_t next_sample = sim_->step() + steps_to_sample();
     const std::int64_t grid = c_.engine.check_every, limits_grid = std::max<std::int64_t>(1, limits_every / grid) * grid;
     for (;;) {
       // On the grid, in absolute step numbers: goals, servo, time step. A stage that needs no time ends at its first look.
@@ -249,7 +381,7 @@ class Experiment {
         if (!missing.empty()) current_.end_reason += ": " + missing;
       }
       if (!over) {
-        if (const auto why = stop_request()) over = true, end = End::stopped, current_.end_reason = *why, current_.reached = false;
+        if (stop_) over = true, end = End::stopped, current_.end_reason = *stop_, current_.reached = false;
       }
       if (over) break;
 
@@ -265,6 +397,8 @@ class Experiment {
       current_.time_step.largest = std::max(current_.time_step.largest, sim_->time_step());
       sim_->advance(target - sim_->step());
       show_progress(index, stand, exact, stage_begin);
+      stop_ = stop_request();
+      if (stop_ || checkpoint_is_due()) keep_within(index, stand, stage, course);
     }
 
     sample(index, speed);
@@ -348,7 +482,16 @@ class Experiment {
   const Case& c_;
   RunFolder& folder_;
   const RunOptions& options_;
-  double wall_begin_;
+  const Checkpoint* from_;                   // null: from the start
+  nlohmann::json kept_;                      // its account of the stages
+  double process_begin_, wall_begin_;        // of this process, and as if the whole run were its work [s]
+  double wall_seconds_ = 0.0;                // so far, as a checkpoint has it
+  double kept_at_, keeping_takes_ = 0.0;     // when the last checkpoint was written, and for how long
+  int checkpoints_asked_ = 0;
+  std::optional<std::int64_t> kept_step_;    // of the last checkpoint
+  std::optional<std::string> stop_;          // why to stop, seen after the last steps
+  StepLimits free_;                          // of a dense bed of the smallest spheres
+  double density_ = 0.0;                     // for inertial numbers [kg/m3]
   std::unique_ptr<Simulation> sim_;
   std::vector<StageResult> closed_;
   StageResult current_;
@@ -363,8 +506,16 @@ class Experiment {
 
 }  // namespace
 
-RunOutcome run_experiment(const Case& c, RunFolder& folder, const RunOptions& options) {
-  return Experiment(c, folder, options).run();
+RunOutcome run_experiment(const Case& c, RunFolder& folder, const RunOptions& options, const Checkpoint* from) {
+  return Experiment(c, folder, options, from).run();
+}
+
+std::size_t rows_of(const Checkpoint& checkpoint) { return nlohmann::json::parse(checkpoint.experiment).at("rows").get<std::size_t>(); }
+
+std::vector<StageResult> stages_of(const Checkpoint& checkpoint) {
+  std::vector<StageResult> closed;
+  fields::from_json(nlohmann::json::parse(checkpoint.experiment).at("closed"), closed);
+  return closed;
 }
 
 }  // namespace platen

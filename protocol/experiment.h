@@ -12,6 +12,7 @@
 #include "core/simulation.h"
 #include "protocol/case_file.h"
 #include "protocol/output.h"
+#include "protocol/output/checkpoint_file.h"
 #include "protocol/records.h"
 
 namespace platen {
@@ -43,6 +44,7 @@ struct RunOptions {
   std::function<void(const Progress&)> progress;            // may be empty
   std::function<void(const StageResult&)> stage_closed;     // may be empty
   const std::atomic<int>* stop_signal = nullptr;            // non-zero: stop soon, exit_stopped
+  const std::atomic<int>* checkpoint_signal = nullptr;      // whenever it changes: a checkpoint soon
 };
 
 struct RunOutcome {
@@ -58,6 +60,9 @@ struct RunOutcome {
 // The time step is set. Throws RunError.
 std::unique_ptr<Simulation> make_simulation(const Case& c, int threads, bool reproducible);
 
+// The Simulation of a checkpoint. Throws OutputError where its kernels are not to be had or it is that of another case.
+std::unique_ptr<Simulation> make_simulation(const Case& c, const Checkpoint& from, int threads);
+
 // Time step before contacts exist, and the limits that it comes from [docs/laws.md, "Stability"].
 struct FirstStep {
   double dt = 0.0;             // what the run starts with [s]
@@ -71,6 +76,11 @@ void refuse_unstable_step(const Case& c);
 
 // Runs all stages. Failures of the run itself (RunError, stop requests, goals not reached) are in the outcome, with the
 // data so far written; OutputError is thrown.
-RunOutcome run_experiment(const Case& c, RunFolder& folder, const RunOptions& options);
+// `from`: where to go on; its folder was reopened with rows_of and stages_of.
+RunOutcome run_experiment(const Case& c, RunFolder& folder, const RunOptions& options, const Checkpoint* from = nullptr);
+
+// What a checkpoint counted on: rows of the series, and the stages closed so far.
+std::size_t rows_of(const Checkpoint& checkpoint);
+std::vector<StageResult> stages_of(const Checkpoint& checkpoint);
 
 }  // namespace platen

@@ -86,11 +86,13 @@ void refuse_unstable_step(const Case& c) {
                               c.file.string(), *c.time.step, 0.9 * first.limits.dt_limit, first.limits.dt_crit));
 }
 
-std::unique_ptr<Simulation> make_simulation(const Case& c, int threads, bool reproducible) {
+namespace {
+
+SimulationSetup setup_of(const Case& c, SphereTable spheres, int threads, bool reproducible) {
   SimulationSetup setup;
   setup.pair = c.particles.law;
   setup.plate = c.plates.law;
-  setup.spheres = c.particles.table ? spheres_from(*c.particles.table) : filled_spheres(c);
+  setup.spheres = std::move(spheres);
   setup.gravity = c.gravity;
   setup.width = c.box.width, setup.depth = c.box.depth;
   setup.periodic = c.box.sides == Sides::periodic;
@@ -104,8 +106,35 @@ std::unique_ptr<Simulation> make_simulation(const Case& c, int threads, bool rep
   engine.reproducible = reproducible;
   engine.energy = c.output.energy;
   engine.instruction_set = preferred_instruction_set();
+  return setup;
+}
 
+}  // namespace
+
+std::unique_ptr<Simulation> make_simulation(const Case& c, const Checkpoint& from, int threads) {
+  SphereTable spheres;
+  spheres.id = from.bed.id, spheres.radius = from.bed.radius, spheres.position = from.bed.position;
+  spheres.density = from.density.size() == 1 ? std::vector<double>(spheres.id.size(), from.density.front()) : from.density;
+  if (spheres.density.size() != spheres.id.size()) throw OutputError("the checkpoint has densities of other spheres");
+  SimulationSetup setup = setup_of(c, std::move(spheres), threads, from.reproducible);
+  if (!from.reproducible) {
+    // Other kernels round differently: the run would go on, but not with the same bits.
+    const auto sets = available_instruction_sets();
+    const auto same = std::find_if(sets.begin(), sets.end(), [&](InstructionSet set) { return to_string(set) == from.instruction_set; });
+    if (same == sets.end()) throw OutputError("the run was made with " + from.instruction_set + " kernels, which this processor does not have; only a run with --reproducible goes on anywhere");
+    setup.engine.instruction_set = *same;
+  }
   auto sim = std::make_unique<Simulation>(std::move(setup));
+  try {
+    sim->take_up(from.bed);
+  } catch (const std::invalid_argument& error) {
+    throw OutputError(std::string("the checkpoint does not fit the case: ") + error.what());
+  }
+  return sim;
+}
+
+std::unique_ptr<Simulation> make_simulation(const Case& c, int threads, bool reproducible) {
+  auto sim = std::make_unique<Simulation>(setup_of(c, c.particles.table ? spheres_from(*c.particles.table) : filled_spheres(c), threads, reproducible));
   sim->set_time_step(first_step(c).dt);
   const auto plane = [&](int plate, double position) {
     PlaneMotion motion;

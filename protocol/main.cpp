@@ -110,6 +110,24 @@ Command add_run(CLI::App& program) {
           }};
 }
 
+Command add_resume(CLI::App& program) {
+  CLI::App* app = program.add_subcommand("resume", "go on with a run that was stopped or killed, from its last checkpoint");
+  auto command = std::make_shared<ResumeCommand>();
+  auto walltime = std::make_shared<std::string>();
+  app->add_option("DIR", command->folder, "run folder")->type_name("DIR")->required();
+  add_threads(*app, command->threads);
+  app->add_option("--max-walltime", *walltime, "stop after this time, e.g. \"90 s\", \"10 min\", \"2 h\"")->type_name("T");
+  app->add_option("--stop-after", command->stop_after, "end after this stage, by name or number")->type_name("STAGE");
+  app->add_flag("!--no-report", command->report, "write no report.html");
+  app->add_flag("--json", command->json, "print the summary as JSON");
+  app->add_flag("-q,--quiet", command->quiet, "print nothing but errors");
+  return {app, "platen resume runs/first", [=] {
+            check_instruction_set();
+            if (!walltime->empty()) command->max_walltime = parse_walltime(*walltime);
+            return resume_command(*command);
+          }};
+}
+
 Command add_check(CLI::App& program) {
   CLI::App* app = program.add_subcommand("check", "say whether a case is right, and what follows from it");
   auto command = std::make_shared<CheckCommand>();
@@ -207,7 +225,7 @@ int run_program(int argc, char** argv) {
   program.set_help_flag("-h,--help", "print this help");
   program.require_subcommand(1);
   program.footer("platen COMMAND --help explains a command.");
-  const std::vector<Command> commands = {add_run(program), add_check(program), add_law(program), add_study(program),
+  const std::vector<Command> commands = {add_run(program), add_resume(program), add_check(program), add_law(program), add_study(program),
                                          add_report(program), add_info(program)};
   for (const Command& command : commands) command.app->footer(std::string("Example:\n  ") + command.example);
 

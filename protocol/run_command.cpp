@@ -10,6 +10,7 @@
 
 #include "kernels/kernel_table.h"
 #include "protocol/experiment.h"
+#include "protocol/info.h"
 #include "protocol/output.h"
 #include "protocol/progress.h"
 #include "protocol/report_command.h"
@@ -73,6 +74,55 @@ std::string stage_named(const Case& c, const std::string& text) {
   throw UsageError(fmt::format("--stop-after: the case has no stage \"{}\"; allowed: {}", text, names));
 }
 
+namespace {
+
+// What both commands do once the folder is theirs.
+struct Course {
+  const Case& c;
+  RunFolder& folder;
+  RunOptions options;
+  const Checkpoint* from = nullptr;
+  bool report = true, json = false, quiet = false;
+};
+
+int carry_out(Course& course) {
+  const fs::path path = course.folder.path();
+  RunOptions& options = course.options;
+  options.stop_signal = &catch_stop_signals(course.quiet);
+  options.checkpoint_signal = &checkpoint_requests();
+  std::vector<std::string> names;
+  for (const StageSpec& stage : course.c.stages) names.push_back(stage.name);
+  ProgressPrinter printer(stderr, progress_style(stderr, course.quiet), names);
+  options.progress = [&](const Progress& progress) { printer.update(progress); };
+  options.stage_closed = [&](const StageResult& stage) { printer.stage_closed(stage); };
+  const RunOutcome outcome = run_experiment(course.c, course.folder, options, course.from);
+  printer.clear();
+  // Whatever the page lacks, the run is done and stands in its files.
+  bool reported = course.report;
+  if (reported && fs::exists(path / "report.html") && course.from == nullptr) {  // that of a former run is gone by now
+    reported = false;
+    spdlog::warn("{}: is yours and stays; `platen report` writes one elsewhere", (path / "report.html").string());
+  }
+  if (reported) try {
+    write_report(path);
+  } catch (const std::exception& error) {
+    reported = false;
+    spdlog::warn("no report.html: {}", error.what());
+  }
+  if (course.json) {
+    print(read_whole_file(path / "summary.json"));
+  } else if (!course.quiet) {
+    print(summary_table(outcome.stages));
+    print(fmt::format("results: {} (results.h5, series.csv, summary.json)\n", path.string()));
+    if (reported) print(fmt::format("report: {}\n", (path / "report.html").string()));
+    if (outcome.exit_code == exit_done) print(fmt::format("state hash: {:016x}\n", outcome.state_hash));
+  }
+  report_end(outcome, path, course.quiet);
+  return outcome.exit_code;
+}
+
+}  // namespace
+
 int run_command(const RunCommand& command) {
   // Everything that can be wrong with the request is found before the folder is touched.
   const Case c = read_case(command.case_file, command.overrides);
@@ -84,46 +134,40 @@ int run_command(const RunCommand& command) {
   if (!command.stop_after.empty()) options.stop_after = stage_named(c, command.stop_after);
 
   const fs::path path = command.folder.empty() ? free_run_folder(command.case_file) : command.folder;
-  options.stop_signal = &catch_stop_signals(command.quiet);
   RunFolder folder = RunFolder::create(path, c.text, command.force);
-
-  std::vector<std::string> names;
-  for (const StageSpec& stage : c.stages) names.push_back(stage.name);
-  ProgressPrinter printer(stderr, progress_style(stderr, command.quiet), names);
-  options.progress = [&](const Progress& progress) { printer.update(progress); };
-  options.stage_closed = [&](const StageResult& stage) { printer.stage_closed(stage); };
   if (!command.quiet)
     spdlog::info("{}: {} spheres, {} stages, {} thread{}, into {}", command.case_file.filename().string(), c.particles.count,
                  c.stages.size(), options.threads, options.threads == 1 ? "" : "s", path.string());
-
   const auto wants_frames = [](const StageSpec& stage) { return stage.frames.value_or(0.0) > 0.0; };
   if (c.output.frames || std::any_of(c.stages.begin(), c.stages.end(), wants_frames))
     spdlog::warn("{}: output.frames: this version does not write frames yet; everything else is written", command.case_file.filename().string());
+  Course course{c, folder, options, nullptr, command.report, command.json, command.quiet};
+  return carry_out(course);
+}
 
-  const RunOutcome outcome = run_experiment(c, folder, options);
-  printer.clear();
-  // Whatever the page lacks, the run is done and stands in its files.
-  bool reported = command.report;
-  if (reported && fs::exists(path / "report.html")) {  // that of a former run is gone by now
-    reported = false;
-    spdlog::warn("{}: is yours and stays; `platen report` writes one elsewhere", (path / "report.html").string());
+int resume_command(const ResumeCommand& command) {
+  const fs::path& path = command.folder;
+  if (!fs::exists(path / "case.toml") || !fs::exists(path / "series.csv")) throw OutputError(path.string() + ": is not a run folder");
+  if (fs::exists(path / "summary.json") && run_state(path).good && !fs::exists(path / "checkpoint.h5") && !fs::exists(path / "checkpoint.prev.h5")) {
+    if (!command.quiet) spdlog::info("{}: {}; nothing is left to do", path.string(), run_state(path).text);
+    return exit_done;
   }
-  if (reported) try {
-    write_report(path);
-  } catch (const std::exception& error) {
-    reported = false;
-    spdlog::warn("no report.html: {}", error.what());
-  }
-  if (command.json) {
-    print(read_whole_file(path / "summary.json"));
-  } else if (!command.quiet) {
-    print(summary_table(outcome.stages));
-    print(fmt::format("results: {} (results.h5, series.csv, summary.json)\n", path.string()));
-    if (reported) print(fmt::format("report: {}\n", (path / "report.html").string()));
-    if (outcome.exit_code == exit_done) print(fmt::format("state hash: {:016x}\n", outcome.state_hash));
-  }
-  report_end(outcome, path, command.quiet);
-  return outcome.exit_code;
+  const Case c = read_case(path / "case.toml", {}, CaseUse::resume);
+  std::string passed_over;
+  const Checkpoint from = newest_checkpoint(path, passed_over);
+  RunOptions options;
+  options.threads = command.threads.value_or(usable_cores());
+  options.reproducible = from.reproducible;
+  options.max_walltime = command.max_walltime;
+  if (!command.stop_after.empty()) options.stop_after = stage_named(c, command.stop_after);
+  make_simulation(c, from, 1);  // fails before the folder is touched, if it does
+  RunFolder folder = RunFolder::reopen(path, rows_of(from), stages_of(from));
+  if (!passed_over.empty()) spdlog::warn("{}; going on from the checkpoint before it", passed_over);
+  if (!command.quiet)
+    spdlog::info("{}: {} spheres, on from step {}, {:.4g} s simulated, {} thread{}", path.string(), from.bed.id.size(), from.bed.step,
+                 from.bed.time_base + static_cast<double>(from.bed.step - from.bed.step_base) * from.bed.dt, options.threads, options.threads == 1 ? "" : "s");
+  Course course{c, folder, options, &from, command.report, command.json, command.quiet};
+  return carry_out(course);
 }
 
 }  // namespace platen

@@ -1,4 +1,4 @@
-// `platen run`: a case from its file to a run folder.
+// `platen run`: a case from its file to a run folder; `platen resume`: a run that was interrupted, on to its end.
 #pragma once
 
 #include <filesystem>
@@ -35,5 +35,17 @@ std::string stage_named(const Case& c, const std::string& text);
 
 // Returns the exit code. Throws UsageError and CaseError before anything is written, OutputError.
 int run_command(const RunCommand& command);
+
+struct ResumeCommand {
+  std::filesystem::path folder;
+  std::optional<int> threads;           // default: usable_cores()
+  std::optional<double> max_walltime;   // [s]
+  std::string stop_after;
+  bool report = true, json = false, quiet = false;  // as of RunCommand
+};
+
+// Goes on with a run that was stopped or killed, from its newest whole checkpoint. A run that is done is left alone, exit code
+// 0. Throws UsageError, CaseError for a case that was changed, OutputError.
+int resume_command(const ResumeCommand& command);
 
 }  // namespace platen

@@ -50,23 +50,20 @@ struct Look {
 std::string what_is_missing(const Stand& stand, const Measures& m);
 
 // A stage that waits for rest: settle and release [A27].
-class RestWatch {
- public:
-  void begin(Stand& stand);
-  std::optional<std::string> done(Stand& stand, const Look& look);
-
- private:
+struct RestWatch {
   struct Sample {
     double time, coordination_number;
     bool quiet;
   };
-  std::deque<Sample> samples_;
-  double kinetic_at_start_ = 0.0;
-  bool from_rest_ = false;        // nothing moved at the start: kinetic_at_start_ is the most that was seen since
+  void begin(Stand& stand);
+  std::optional<std::string> done(Stand& stand, const Look& look);
+  std::deque<Sample> samples;
+  double kinetic_at_start = 0.0;
+  bool from_rest = false;        // nothing moved at the start: kinetic_at_start is the most that was seen since
 };
 
 struct FillStage {
-  std::optional<double> landed_since_;  // [s]
+  std::optional<double> landed_since;  // [s]
   static bool landed(const Stand& stand, const Measures& m);
   void begin(Stand& stand);
   void update(Stand&, const Look&) {}

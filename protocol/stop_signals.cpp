@@ -10,6 +10,7 @@ namespace platen {
 namespace {
 
 std::atomic<int> stop_signal{0};
+std::atomic<int> checkpoint_signal{0};
 std::atomic<bool> silent{false};
 static_assert(std::atomic<int>::is_always_lock_free, "a signal handler may not wait");
 
@@ -30,7 +31,11 @@ extern "C" void on_stop_signal(int number) {
   errno = saved;
 }
 
+extern "C" void on_checkpoint_signal(int) { checkpoint_signal.fetch_add(1); }
+
 }  // namespace
+
+const std::atomic<int>& checkpoint_requests() { return checkpoint_signal; }
 
 const std::atomic<int>& catch_stop_signals(bool quiet) {
   silent = quiet;
@@ -42,7 +47,9 @@ const std::atomic<int>& catch_stop_signals(bool quiet) {
   struct sigaction before = {};
   sigaction(SIGHUP, nullptr, &before);
   if (before.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
-  for (const int number : {SIGXFSZ, SIGPIPE, SIGUSR1}) signal(number, SIG_IGN);
+  for (const int number : {SIGXFSZ, SIGPIPE}) signal(number, SIG_IGN);
+  action.sa_handler = on_checkpoint_signal;
+  sigaction(SIGUSR1, &action, nullptr);
   return stop_signal;
 }
 

@@ -68,9 +68,9 @@ Stage make_stage(const StageSpec& spec) {
 // ------------------------------------------------------------------------------------------------------------- rest
 
 void RestWatch::begin(Stand& stand) {
-  samples_.clear();
-  kinetic_at_start_ = stand.sim.measure(false).kinetic_energy;
-  from_rest_ = kinetic_at_start_ == 0.0;
+  samples.clear();
+  kinetic_at_start = stand.sim.measure(false).kinetic_energy;
+  from_rest = kinetic_at_start == 0.0;
 }
 
 std::optional<std::string> RestWatch::done(Stand& stand, const Look& look) {
@@ -78,21 +78,21 @@ std::optional<std::string> RestWatch::done(Stand& stand, const Look& look) {
   const Measures& m = look.m;
   const bool gravity = stand.c.gravity > 0.0, bottom = stand.sim.plane(plate_bottom).present;
   // Without gravity there is no potential energy to compare with, without a bottom no support.
-  if (from_rest_) kinetic_at_start_ = std::max(kinetic_at_start_, m.kinetic_energy);
-  const double scale = gravity ? m.potential_energy : kinetic_at_start_;
+  if (from_rest) kinetic_at_start = std::max(kinetic_at_start, m.kinetic_energy);
+  const double scale = gravity ? m.potential_energy : kinetic_at_start;
   bool quiet = m.kinetic_energy <= until.kinetic_to_potential * scale;
   if (gravity && bottom) quiet = quiet && std::fabs(m.support_force - m.weight) <= 0.01 * m.weight;
-  samples_.push_back({m.time, m.coordination_number, quiet});
+  samples.push_back({m.time, m.coordination_number, quiet});
   const double begin = m.time - until.window;
-  while (samples_.size() > 1 && samples_[1].time <= begin) samples_.pop_front();
-  if (samples_.front().time > begin) return std::nullopt;
-  double low = samples_.front().coordination_number, high = low, sum = 0.0;
-  for (const Sample& s : samples_) {
+  while (samples.size() > 1 && samples[1].time <= begin) samples.pop_front();
+  if (samples.front().time > begin) return std::nullopt;
+  double low = samples.front().coordination_number, high = low, sum = 0.0;
+  for (const Sample& s : samples) {
     if (!s.quiet) return std::nullopt;
     low = std::min(low, s.coordination_number), high = std::max(high, s.coordination_number);
     sum += s.coordination_number;
   }
-  if (high - low > until.coordination_change * sum / static_cast<double>(samples_.size())) return std::nullopt;
+  if (high - low > until.coordination_change * sum / static_cast<double>(samples.size())) return std::nullopt;
   return fmt::format("at rest for {:.3g} s", until.window);
 }
 
@@ -106,12 +106,12 @@ void FillStage::begin(Stand& stand) {
 std::optional<std::string> FillStage::done(Stand& stand, const Look& look) {
   if (stand.spec.method == FillMethod::grow) return "bed grown to the target porosity";
   if (!landed(stand, look.m)) {
-    landed_since_.reset();
+    landed_since.reset();
     return std::nullopt;
   }
   // Throughout the time of a small bounce: a sphere at the top of one is slow, yet not landed.
-  if (!landed_since_) landed_since_ = look.m.time;
-  if (look.m.time - *landed_since_ < 0.05) return std::nullopt;
+  if (!landed_since) landed_since = look.m.time;
+  if (look.m.time - *landed_since < 0.05) return std::nullopt;
   return "all spheres have landed";
 }
 

@@ -1,0 +1,40 @@
+// Checkpoints: all that a run needs to go on with the same bits, in one file that is either whole or refused.
+//
+//   checkpoint.h5       the newest one
+//   checkpoint.prev.h5  the one before
+//
+// HDF5 (groups spheres, pairs, plates, planes, sums) with the state of the experiment as JSON text; behind the HDF5 content
+// a line with the XXH3 of all bytes before it, which HDF5 readers do not mind.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/simulation_state.h"
+
+namespace platen {
+
+struct Checkpoint {
+  SimulationState bed;
+  std::vector<double> density;     // by rank [kg/m3]; one number where all are equal
+  std::string experiment;          // where the stages stand, JSON
+  std::string instruction_set;
+  bool reproducible = false;
+};
+
+// Writes checkpoint.h5; what was there becomes checkpoint.prev.h5. Throws OutputError, the former ones stay then.
+void write_checkpoint(const std::filesystem::path& folder, const Checkpoint& checkpoint);
+
+// Throws OutputError for a file that is not there, damaged in any bit, or of another format.
+Checkpoint read_checkpoint(const std::filesystem::path& file);
+
+// The newest whole checkpoint of a folder; `passed_over` says what was wrong with a newer one. Throws OutputError where there
+// is none.
+Checkpoint newest_checkpoint(const std::filesystem::path& folder, std::string& passed_over);
+
+void remove_checkpoints(const std::filesystem::path& folder);
+
+}  // namespace platen
