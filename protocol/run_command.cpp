@@ -134,6 +134,7 @@ int run_command(const RunCommand& command) {
   if (!command.stop_after.empty()) options.stop_after = stage_named(c, command.stop_after);
 
   const fs::path path = command.folder.empty() ? free_run_folder(command.case_file) : command.folder;
+  catch_stop_signals(command.quiet);  // before anything is begun that should be ended in good order
   RunFolder folder = RunFolder::create(path, c.text, command.force);
   if (!command.quiet)
     spdlog::info("{}: {} spheres, {} stages, {} thread{}, into {}", command.case_file.filename().string(), c.particles.count,
@@ -160,6 +161,7 @@ int resume_command(const ResumeCommand& command) {
   options.reproducible = from.reproducible;
   options.max_walltime = command.max_walltime;
   if (!command.stop_after.empty()) options.stop_after = stage_named(c, command.stop_after);
+  catch_stop_signals(command.quiet);
   make_simulation(c, from, 1);  // fails before the folder is touched, if it does
   RunFolder folder = RunFolder::reopen(path, rows_of(from), stages_of(from));
   if (!passed_over.empty()) spdlog::warn("{}; going on from the checkpoint before it", passed_over);

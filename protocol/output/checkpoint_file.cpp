@@ -81,8 +81,8 @@ void write_content(const fs::path& path, const Checkpoint& c) {
     planes.write("start", whole, 2, {"-", "whether it is there, step from which this motion holds"});
 
     Hdf5Group totals = root.create_group("totals");
-    totals.write("steps", std::vector<std::int64_t>{s.step, s.step_base, s.contacts, s.rebuilds, s.prunes, s.redone_steps, s.sides_open ? 1 : 0}, 1,
-                 {"-", "step, step at which dt began to hold, touching pairs, rebuilds, prunes, steps done twice, sides open"});
+    totals.write("steps", std::vector<std::int64_t>{s.step, s.step_base, s.contacts, s.rebuilds, s.prunes, s.redone_steps, s.sides_open ? 1 : 0, s.forces_valid ? 1 : 0}, 1,
+                 {"-", "step, step at which dt began to hold, touching pairs, rebuilds, prunes, steps done twice, sides open, forces found"});
     totals.write("times", std::vector<double>{s.dt, s.last_drift, s.time_base, s.inserted, s.removed}, 1,
                  {"-", "dt, last dt, time at which dt began to hold [s], inserted, removed energy [J]"});
     std::vector<std::int64_t> quanta;
@@ -122,10 +122,13 @@ void write_checkpoint(const fs::path& folder, const Checkpoint& checkpoint) {
   rename_into_place(folder / unnamed, path);
 }
 
-Checkpoint read_checkpoint(const fs::path& path) {
-  const std::string bytes = read_whole_file(path);
+bool checkpoint_is_whole(std::string_view bytes) {
   const std::size_t length = last_line("").size();
-  if (bytes.size() <= length || std::string_view(bytes).substr(bytes.size() - length) != last_line(std::string_view(bytes).substr(0, bytes.size() - length)))
+  return bytes.size() > length && bytes.substr(bytes.size() - length) == last_line(bytes.substr(0, bytes.size() - length));
+}
+
+Checkpoint read_checkpoint(const fs::path& path) {
+  if (!checkpoint_is_whole(read_whole_file(path)))
     throw OutputError(path.string() + ": is damaged, or no checkpoint");
   const Hdf5File file = Hdf5File::open(path);
   const Hdf5Group root = file.root();
@@ -164,8 +167,8 @@ Checkpoint read_checkpoint(const fs::path& path) {
     s.planes[k] = {start[2 * k] != 0, x[0], x[1], x[2], x[3], x[4], x[5], start[2 * k + 1], x[6]};
   }
   const Hdf5Group totals = root.group("totals");
-  const auto steps = read<std::int64_t>(totals, "steps", 7, path);
-  s.step = steps[0], s.step_base = steps[1], s.contacts = steps[2], s.rebuilds = steps[3], s.prunes = steps[4], s.redone_steps = steps[5], s.sides_open = steps[6] != 0;
+  const auto steps = read<std::int64_t>(totals, "steps", 8, path);
+  s.step = steps[0], s.step_base = steps[1], s.contacts = steps[2], s.rebuilds = steps[3], s.prunes = steps[4], s.redone_steps = steps[5], s.sides_open = steps[6] != 0, s.forces_valid = steps[7] != 0;
   const auto times = read<double>(totals, "times", 5, path);
   s.dt = times[0], s.last_drift = times[1], s.time_base = times[2], s.inserted = times[3], s.removed = times[4];
   const auto quanta = read<std::int64_t>(totals, "energies", 2 * (term_count + 2), path);

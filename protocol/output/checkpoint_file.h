@@ -8,9 +8,8 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json_fwd.hpp>
-#include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/simulation_state.h"
@@ -27,6 +26,9 @@ struct Checkpoint {
 
 // Writes checkpoint.h5; what was there becomes checkpoint.prev.h5. Throws OutputError, the former ones stay then.
 void write_checkpoint(const std::filesystem::path& folder, const Checkpoint& checkpoint);
+
+// Whether the bytes of a file are those that were written: the line at their end tells.
+bool checkpoint_is_whole(std::string_view bytes);
 
 // Throws OutputError for a file that is not there, damaged in any bit, or of another format.
 Checkpoint read_checkpoint(const std::filesystem::path& file);

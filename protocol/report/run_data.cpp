@@ -106,7 +106,9 @@ Json limits_data(const fs::path& log, const SeriesTable& series) {
     const double step = entry.value("step", 0.0);
     const std::size_t above = std::min(static_cast<std::size_t>(std::upper_bound(steps.begin(), steps.end(), step) - steps.begin()), steps.size() - 1), below = above > 0 ? above - 1 : 0;
     const double share = steps[above] > steps[below] ? std::min(1.0, (step - steps[below]) / (steps[above] - steps[below])) : 0.0;
-    Json point = {{"time", rounded(times[below] + share * (times[above] - times[below]))}};
+    // After an interruption the run came by here once more.
+    while (!limits.empty() && limits.back()["step"].get<double>() >= step) limits.erase(limits.size() - 1);
+    Json point = {{"step", step}, {"time", rounded(times[below] + share * (times[above] - times[below]))}};
     for (const char* key : {"dt", "dt_crit", "dt_limit"})
       if (entry.contains(key) && entry[key].is_number()) point[key] = rounded(entry[key].get<double>());
     limits.push_back(std::move(point));

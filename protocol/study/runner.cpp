@@ -19,6 +19,7 @@
 #include <thread>
 
 #include "protocol/experiment.h"
+#include "protocol/output/checkpoint_file.h"
 #include "protocol/output/files.h"
 #include "protocol/study/porosity_match.h"
 #include "protocol/study/settled_sample.h"
@@ -30,6 +31,18 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 double since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+// Whether an interrupted run of this very case has left a checkpoint.
+bool can_go_on(const fs::path& folder, const std::string& case_text) {
+  try {
+    if (!fs::exists(folder / "case.toml") || read_whole_file(folder / "case.toml") != case_text) return false;
+    std::string passed_over;
+    newest_checkpoint(folder, passed_over);
+    return true;
+  } catch (const std::exception&) {
+    return false;
+  }
+}
 
 std::string text_of(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -219,9 +232,12 @@ class Runner {
     const fs::path file = options_.folder / "cases" / (name + ".toml");
     write_whole_file(file, c.text);
     wait_until_free(folder);
-    std::vector<std::string> words{
-        "platen",  "run",    file.string(), "-o", folder.string(), "--threads", std::to_string(job.threads),
-        "--force", "--quiet"};
+    std::vector<std::string> words{"platen"};
+    if (attempt == 0 && !job.timed && can_go_on(folder, c.text))
+      words.insert(words.end(), {"resume", folder.string()});
+    else
+      words.insert(words.end(), {"run", file.string(), "-o", folder.string(), "--force"});
+    words.insert(words.end(), {"--threads", std::to_string(job.threads), "--quiet", "--no-report"});
     if (attempt > 0) words.insert(words.end(), {"--stop-after", settled_stage(c)->name});
     outcomes_[k].state = JobState::running;
     const std::optional<double> steal = job.timed ? steal_seconds() : std::nullopt;

@@ -1,0 +1,339 @@
+// Checkpoints and `platen resume`: whatever interrupts a run, and wherever, what it leaves in the end is what an
+// uninterrupted one leaves, bit for bit.
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "core/simulation_state.h"
+#include "protocol/output/checkpoint_file.h"
+#include "protocol/output/hdf5_file.h"
+#include "tests/experiment_case.h"
+#include "tests/scenes.h"
+
+namespace platen::test {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+std::string replaced(const std::string& from, const std::string& to, std::string text) {
+  const std::size_t at = text.find(from);
+  if (at == std::string::npos) throw std::logic_error("no " + from);
+  return text.replace(at, from.size(), to);
+}
+
+// What a summary says of the experiment, without what the clock or the lists say.
+Json facts(const fs::path& folder) {
+  Json summary = Json::parse(read_file(folder / "summary.json"));
+  summary.erase("performance");
+  for (Json& stage : summary.at("stages")) stage.erase("particle_steps_per_second");
+  return summary;
+}
+
+void expect_same_group(const Hdf5Group& a, const Hdf5Group& b, const std::string& path) {
+  ASSERT_EQ(a.names(), b.names()) << path;
+  for (const std::string& name : a.names()) {
+    const std::string here = path + name;
+    ASSERT_EQ(a.is_group(name), b.is_group(name)) << here;
+    if (a.is_group(name)) {
+      expect_same_group(a.group(name), b.group(name), here + "/");
+      continue;
+    }
+    const Hdf5Shape shape = a.shape(name);
+    ASSERT_EQ(shape.size, b.shape(name).size) << here;
+    ASSERT_EQ(shape.type, b.shape(name).type) << here;
+    if (shape.type == "float64") {
+      const auto x = a.read<double>(name), y = b.read<double>(name);
+      for (std::size_t k = 0; k < x.size(); ++k) ASSERT_TRUE(x[k] == y[k] || (std::isnan(x[k]) && std::isnan(y[k]))) << here << ", number " << k << ": " << x[k] << ", " << y[k];
+    } else if (shape.type == "string") {
+      ASSERT_EQ(a.read_text(name), b.read_text(name)) << here;
+    } else if (shape.type != "enum") {
+      ASSERT_EQ(a.read<std::int64_t>(name), b.read<std::int64_t>(name)) << here;
+    }
+  }
+}
+
+void expect_same_run(const fs::path& whole, const fs::path& broken) {
+  EXPECT_EQ(read_file(whole / "series.csv"), read_file(broken / "series.csv"));
+  EXPECT_EQ(facts(whole), facts(broken));
+  const Hdf5File a = Hdf5File::open(whole / "results.h5"), b = Hdf5File::open(broken / "results.h5");
+  expect_same_group(a.root(), b.root(), "/");
+}
+
+// Stopped, killed, or told to keep a checkpoint and killed, at random, on one thread and on two, until it is done.
+// Returns how often it went on from a checkpoint.
+int run_with_interruptions(const fs::path& folder, const std::vector<std::string>& first, const ProgramOptions& options, unsigned seed) {
+  std::mt19937 random(seed);
+  int resumed = 0;
+  bool going = false;
+  for (int attempt = 0; attempt < 200; ++attempt) {
+    std::vector<std::string> words = going ? std::vector<std::string>{"resume", folder.string(), "-q", "--no-report"} : first;
+    words.insert(words.end(), {"--threads", random() % 2 ? "1" : "2"});
+    RunningProgram program(words, options);
+    const auto wait = [&](unsigned most) { std::this_thread::sleep_for(std::chrono::milliseconds(random() % most + 20)); };
+    wait(400);
+    const unsigned how = random() % 3;
+    if (how == 0) {
+      program.send(SIGUSR1);
+      wait(150);
+    }
+    program.send(how == 2 ? SIGTERM : SIGKILL);
+    const ProgramResult result = program.wait(120.0);
+    if (result.exit_code == 0) return resumed;
+    if (result.exit_code == 5) {
+      EXPECT_TRUE(has(result.err, "holds no checkpoint")) << result.report();
+      going = false;
+      continue;
+    }
+    if (result.exit_code != 75) {
+      EXPECT_NE(result.signal, 0) << result.report();  // also one that came before the program could catch any
+    }
+    resumed += going;
+    going = fs::exists(folder / "checkpoint.h5") || fs::exists(folder / "checkpoint.prev.h5");
+  }
+  ADD_FAILURE() << "never done";
+  return resumed;
+}
+
+struct ResumeCase {
+  const char* name;
+  std::string text;
+};
+
+void PrintTo(const ResumeCase& c, std::ostream* out) { *out << c.name; }
+
+// The whole protocol, automatic step.
+const std::string every_stage = replaced("step = \"10 us\"", "step = \"auto\"", small_bed) + fill + "[[stage]]\nkind = \"vibrate\"\nfrequency = 60.0\namplitude = 1e-3\nduration = 0.1\n" + quick_settle + press +
+                                "[[stage]]\nkind = \"hold\"\nstress = \"20 kPa\"\nduration = \"80 ms\"\n" + unload +
+                                "[[stage]]\nkind = \"release\"\nuntil = { kinetic_to_potential = 1e-4, window = \"20 ms\" }\n"
+                                "[[stage]]\nkind = \"crush\"\nspeed = \"50 mm/s\"\nstart_gap = \"0.1 mm\"\nuntil = { strain = 0.1, drop = 0.2 }\n";
+
+// Unequal spheres between walls, exponent 3/2, a fixed step.
+const std::string walls = replaced("sides = \"periodic\"", "sides = \"walls\"",
+                                   replaced("height = \"80 mm\"\n", "height = \"80 mm\"\nsides = \"periodic\"\n",
+                                            replaced("radius = \"2.5 mm\"", "sizes = { kind = \"uniform\", min = \"1.8 mm\", max = \"2.5 mm\" }",
+                                                     replaced("k1 = \"5 kN/m\"\nk2 = \"25 kN/m\"\nk_adh = \"5 kN/m\"", "k1 = 2e5\nk2 = 4e5\nexponent = 1.5", small_bed)))) +
+                          fill + quick_settle + press + unload;
+
+class Resume : public ::testing::TestWithParam<ResumeCase> {};
+
+TEST_P(Resume, InterruptedAtRandomItLeavesTheSame) {
+  TemporaryFolder root;
+  write_file(root / "case.toml", GetParam().text);
+  const ProgramResult whole = run_program({"run", (root / "case.toml").string(), "-o", (root / "whole").string(), "--threads", "1", "-q", "--no-report"});
+  ASSERT_EQ(whole.exit_code, 0) << whole.report();
+  EXPECT_FALSE(fs::exists(root / "whole/checkpoint.h5"));
+  int resumed = 0;
+  for (int repeat = 0; repeat < 2; ++repeat) {
+    const unsigned seed = std::random_device{}();
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const fs::path folder = root / ("broken" + std::to_string(repeat));
+    resumed += run_with_interruptions(folder, {"run", (root / "case.toml").string(), "-o", folder.string(), "-q", "--no-report", "--force"}, {}, seed);
+    expect_same_run(root / "whole", folder);
+    EXPECT_FALSE(fs::exists(folder / "checkpoint.h5")) << "nothing is left to do";
+    if (HasFailure()) return;
+  }
+  EXPECT_GT(resumed, 0) << "it was never interrupted: the test shows nothing";
+}
+
+INSTANTIATE_TEST_SUITE_P(Cases, Resume, ::testing::Values(ResumeCase{"EveryStage", every_stage}, ResumeCase{"WallsUnequalExponent", walls}),
+                         [](const auto& chosen) { return std::string(chosen.param.name); });
+
+TEST(ResumeCommand, AfterEachStageWithoutTheParticleFile) {
+  TemporaryFolder root;
+  // 4 x 4 x 4 spheres of two sizes, their densities unequal; the file is gone when the run goes on.
+  std::string table = "id,x,y,z,radius,density\n";
+  for (int k = 0; k < 64; ++k)
+    table += std::to_string(200 - 3 * k) + "," + exact(0.003 + 0.005 * (k % 4)) + "," + exact(0.003 + 0.005 * (k / 4 % 4) + 1e-5 * k) + "," + exact(0.003 + 0.0052 * (k / 16)) + "," + (k % 2 ? "0.0025" : "0.002") + "," +
+             (k % 3 ? "2000" : "1500") + "\n";
+  write_file(root / "spheres.csv", table);
+  write_file(root / "case.toml", table_case(quick_settle + press + unload, "[box]\nwidth = \"20 mm\"\ndepth = \"20 mm\"\nheight = \"30 mm\"\n", "9.81"));
+  const std::string file = (root / "case.toml").string();
+  ProgramResult result = run_program({"run", file, "-o", (root / "whole").string(), "-q", "--no-report", "--reproducible"});
+  ASSERT_EQ(result.exit_code, 0) << result.report();
+  result = run_program({"run", file, "-o", (root / "steps").string(), "-q", "--no-report", "--reproducible", "--stop-after", "settle"});
+  ASSERT_EQ(result.exit_code, 0) << result.report();
+  EXPECT_TRUE(fs::exists(root / "steps/checkpoint.h5"));
+  fs::remove(root / "spheres.csv");
+  result = run_program({"resume", (root / "steps").string(), "-q", "--no-report", "--stop-after", "2"});
+  ASSERT_EQ(result.exit_code, 0) << result.report();
+  ProgramOptions scalar;  // --reproducible was kept, so other kernels do
+  scalar.environment = {{"PLATEN_ISA", "scalar"}};
+  result = run_program({"resume", (root / "steps").string()}, scalar);
+  ASSERT_EQ(result.exit_code, 0) << result.report();
+  EXPECT_TRUE(has(result.out, "report: ")) << result.out;
+  expect_same_run(root / "whole", root / "steps");
+  result = run_program({"resume", (root / "steps").string()});
+  EXPECT_EQ(result.exit_code, 0) << result.report();
+  EXPECT_TRUE(has(result.err, "nothing is left to do")) << result.err;
+}
+
+TEST(ResumeCommand, SaysWhatIsWrong) {
+  TemporaryFolder root;
+  write_file(root / "case.toml", small_bed + fill + quick_settle + press);
+  const fs::path run = root / "run";
+  const std::vector<std::string> start = {"run", (root / "case.toml").string(), "-o", run.string(), "-q", "--no-report", "--force", "--stop-after", "settle"};
+  const auto fails = [&](int code, const std::string& said) {
+    const ProgramResult result = run_program({"resume", run.string(), "--no-report", "-q"});
+    EXPECT_EQ(result.exit_code, code) << result.report();
+    EXPECT_TRUE(has(result.err, said)) << said << "\n" << result.err;
+  };
+  fails(5, "is not a run folder");
+  ASSERT_EQ(run_program(start).exit_code, 0);
+  fs::remove(run / "checkpoint.h5");
+  fs::remove(run / "summary.json");
+  fails(5, "holds no checkpoint to go on from");
+  ASSERT_EQ(run_program(start).exit_code, 0);
+  const std::string series = read_file(run / "series.csv");
+  // The case was changed meanwhile: other stages, other spheres.
+  write_file(run / "case.toml", small_bed + fill);
+  fails(5, "does not fit the case");
+  write_file(run / "case.toml", small_bed + "[[stage]]\n");
+  fails(3, "kind");
+  EXPECT_EQ(read_file(run / "series.csv"), series) << "nothing was touched";
+  write_file(run / "case.toml", small_bed + fill + quick_settle + press);
+  // Other kernels would round differently.
+  ProgramOptions options;
+  const std::string whole = read_file(run / "checkpoint.h5");
+  Checkpoint other = read_checkpoint(run / "checkpoint.h5");
+  other.instruction_set = "avx9000";
+  write_checkpoint(run, other);
+  fails(5, "avx9000 kernels, which this processor does not have");
+  // The newest is damaged: the one before serves, and it is said. Both damaged: an error.
+  write_file(run / "checkpoint.h5", whole.substr(0, whole.size() - 1));
+  write_file(run / "checkpoint.prev.h5", whole);
+  ProgramResult result = run_program({"resume", run.string(), "--no-report"});
+  EXPECT_EQ(result.exit_code, 0) << result.report();
+  EXPECT_TRUE(has(result.err, "checkpoint.h5: is damaged, or no checkpoint; going on from the checkpoint before it")) << result.err;
+  ASSERT_EQ(run_program(start).exit_code, 0);
+  write_file(run / "checkpoint.h5", "x");
+  write_file(run / "checkpoint.prev.h5", whole.substr(1));
+  fails(5, "checkpoint.prev.h5: is damaged, or no checkpoint");
+}
+
+TEST(ResumeCommand, ACheckpointThatCannotBeWrittenIsAWarning) {
+  TemporaryFolder root;
+  write_file(root / "case.toml", small_bed + fill + quick_settle);
+  const fs::path run = root / "run";
+  fs::create_directories(run);
+  RunningProgram program({"run", (root / "case.toml").string(), "-o", run.string(), "--no-report", "--force"}, {});
+  const auto log = [&] { return fs::exists(run / "log.jsonl") ? read_file(run / "log.jsonl") : std::string(); };
+  for (int k = 0; k < 10000 && !has(log(), "\"start\""); ++k) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  fs::create_directories(run / "checkpoint.body/in the way");
+  for (int k = 0; k < 10000 && !has(log(), "checkpoint failed") && !has(log(), "\"end\""); ++k) {
+    program.send(SIGUSR1);
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  const ProgramResult result = program.wait(120.0);
+  EXPECT_EQ(result.exit_code, 0) << result.report();
+  EXPECT_TRUE(has(result.out, "a checkpoint could not be written")) << result.report();
+}
+
+// ---- the file -----------------------------------------------------------------------------------------------------------
+
+Checkpoint small_checkpoint() {
+  scenes::BedOptions o;
+  o.nx = o.ny = 3, o.nz = 2;
+  Simulation sim(scenes::bed(o, scenes::full_law(), {}));
+  sim.set_time_step(1e-5);
+  scenes::add_plates(sim, scenes::height_of(o), -0.05);
+  sim.advance(40);
+  Checkpoint c;
+  c.bed = sim.whole_state();
+  c.density = {2000.0};
+  c.experiment = "{\"rows\":3}";
+  c.instruction_set = "scalar";
+  return c;
+}
+
+TEST(CheckpointFile, EveryBitIsWatched) {
+  TemporaryFolder root;
+  write_checkpoint(root.path(), small_checkpoint());
+  const std::string bytes = read_file(root / "checkpoint.h5");
+  EXPECT_TRUE(checkpoint_is_whole(bytes));
+  std::string damaged = bytes;
+  for (std::size_t k = 0; k < bytes.size(); ++k)
+    for (int bit = 0; bit < 8; ++bit) {
+      damaged[k] = static_cast<char>(bytes[k] ^ (1 << bit));
+      ASSERT_FALSE(checkpoint_is_whole(damaged)) << "byte " << k << ", bit " << bit;
+      damaged[k] = bytes[k];
+    }
+  for (std::size_t size = 0; size < bytes.size(); ++size) ASSERT_FALSE(checkpoint_is_whole(std::string_view(bytes).substr(0, size))) << size;
+  EXPECT_FALSE(checkpoint_is_whole(bytes + '\n'));
+  write_file(root / "checkpoint.h5", damaged.replace(bytes.size() / 2, 1, 1, static_cast<char>(bytes[bytes.size() / 2] ^ 1)));
+  EXPECT_THROW(read_checkpoint(root / "checkpoint.h5"), OutputError);
+}
+
+TEST(CheckpointFile, ComesBackToTheBit) {
+  TemporaryFolder root;
+  const Checkpoint c = small_checkpoint();
+  EXPECT_FALSE(c.bed.pairs.empty());
+  EXPECT_FALSE(c.bed.plates.empty());
+  write_checkpoint(root.path(), c);
+  write_checkpoint(root.path(), c);
+  EXPECT_EQ(read_file(root / "checkpoint.h5"), read_file(root / "checkpoint.prev.h5"));
+  const Checkpoint d = read_checkpoint(root / "checkpoint.h5");
+  EXPECT_EQ(c.bed.position, d.bed.position);
+  EXPECT_EQ(c.bed.sums, d.bed.sums);
+  EXPECT_EQ(c.bed.image, d.bed.image);
+  ASSERT_EQ(c.bed.pairs.size(), d.bed.pairs.size());
+  for (std::size_t k = 0; k < c.bed.pairs.size(); ++k) EXPECT_EQ(std::memcmp(&c.bed.pairs[k], &d.bed.pairs[k], sizeof(PairHistory)), 0);
+  for (int term = 0; term < term_count; ++term) EXPECT_TRUE(c.bed.dissipated[term] == d.bed.dissipated[term]);
+  EXPECT_TRUE(c.bed.plate_work == d.bed.plate_work && c.bed.plate_work != 0);
+  EXPECT_EQ(c.bed.planes[plate_top].origin, d.bed.planes[plate_top].origin);
+  EXPECT_EQ(c.experiment, d.experiment);
+  EXPECT_EQ(c.instruction_set, d.instruction_set);
+}
+
+// ---- the engine -----------------------------------------------------------------------------------------------------------
+
+// Every law that kernels are built for, several threads, open sides: taken out, put into a fresh Simulation, on.
+TEST(SimulationState, GoesOnWithTheSameBits) {
+  for (const scenes::LawCase& law : scenes::laws_of_scenes()) {
+    SCOPED_TRACE(law.name);
+    scenes::BedOptions o;
+    o.nx = o.ny = 5, o.nz = 6, o.spread = law.spread;
+    EngineOptions engine;
+    engine.instruction_set = preferred_instruction_set();
+    const SimulationSetup setup = scenes::bed(o, law.law, engine);
+    Simulation whole(setup);
+    whole.set_time_step(2e-6);
+    scenes::add_plates(whole, scenes::height_of(o), -0.2);
+    whole.count_inserted();
+    for (const bool open : {false, true}) {
+      SCOPED_TRACE(open ? "open" : "periodic");
+      if (open) whole.open_sides();
+      whole.advance(150);
+      SimulationSetup other = setup;
+      other.engine.threads = 2, other.engine.batch = 24, other.engine.executor = Executor::flow_graph;
+      Simulation broken(other);
+      broken.take_up(whole.whole_state());
+      EXPECT_EQ(broken.state_hash(), whole.state_hash());
+      whole.set_time_step(1.5e-6), broken.set_time_step(1.5e-6);
+      whole.advance(150), broken.advance(150);
+      EXPECT_EQ(broken.state_hash(), whole.state_hash());
+      EXPECT_EQ(broken.measure().energy_residual, whole.measure().energy_residual);
+      EXPECT_EQ(broken.measure().stress_top, whole.measure().stress_top);
+      EXPECT_EQ(broken.time(), whole.time());
+    }
+  }
+}
+
+TEST(SimulationState, OfOtherSpheresIsRefused) {
+  scenes::BedOptions o;
+  Simulation sim(scenes::bed(o, scenes::full_law(), {}));
+  SimulationState state = sim.whole_state();
+  o.nx = 5;
+  Simulation other(scenes::bed(o, scenes::full_law(), {}));
+  EXPECT_THROW(other.take_up(state), std::invalid_argument);
+  state.pairs.push_back({0, 64, 0.0, 0.0, 0.0, 0.0, 0.0});
+  Simulation same(scenes::bed({}, scenes::full_law(), {}));
+  EXPECT_THROW(same.take_up(state), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace platen::test
