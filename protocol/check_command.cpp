@@ -82,9 +82,6 @@ void add_notes(const Case& c, CheckReport& report) {
     if (const ExpectedStage& e = report.stages[k]; e.needed > e.simulated * (1.0 + 1e-9))
       report.notes.push_back(fmt::format("{}: needs about {:.3g} s; max_duration = {:.3g} s ends the run before that (exit code {})", e.name, e.needed,
                                          e.simulated, static_cast<int>(exit_goal)));
-  const auto wants_frames = [](const StageSpec& stage) { return stage.frames.value_or(0.0) > 0.0; };
-  if (c.output.frames || std::any_of(c.stages.begin(), c.stages.end(), wants_frames))
-    report.notes.push_back("output.frames: this version does not write frames yet");
   for (const InertialNumber& i : report.inertial)
     if (i.value > 1e-3)
       report.notes.push_back(fmt::format("{}: inertial number {:.1e} at {:.3g} Pa ({}): not quasi-static there (below 1e-4 it is)",

@@ -108,6 +108,7 @@ class Experiment {
     v("free_dt_crit", free_.dt_crit), v("free_dt_pairs", free_.dt_pairs), v("free_dt_limit", free_.dt_limit);
     v("closed", closed_), v("current", current_), v("stage_open", stage_open_), v("strain_zero_height", strain_zero_height_);
     v("last_wanted", last_wanted_), v("looked_stress", looked_stress_), v("looked_contacts", looked_contacts_);
+    v("framed_step", framed_step_);
   }
 
   bool checkpoint_is_due() const {
@@ -125,7 +126,7 @@ class Experiment {
     nlohmann::json experiment = nlohmann::json::object();
     fields::Writer writer{experiment};
     each_field(writer);
-    experiment["rows"] = folder_.rows();
+    experiment["rows"] = folder_.rows(), experiment["frames"] = folder_.frames();
     experiment["stage"] = std::move(stage);
     Checkpoint checkpoint;
     checkpoint.bed = sim_->whole_state();
@@ -225,6 +226,19 @@ class Experiment {
     return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(((done + 1.0) * interval - sim_->time()) / dt - 1e-6)));
   }
 
+  // The same for frames; never where there are none.
+  std::int64_t step_of_next_frame(double interval) const {
+    if (!(interval > 0.0)) return std::numeric_limits<std::int64_t>::max();
+    const double done = std::floor(sim_->time() / interval * (1.0 + 1e-12) + 1e-9);
+    return sim_->step() + std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(((done + 1.0) * interval - sim_->time()) / sim_->time_step() - 1e-6)));
+  }
+
+  void add_frame() {
+    if (framed_step_ == sim_->step()) return;  // the last of a stage is the first of the next
+    framed_step_ = sim_->step();
+    folder_.add_frame(sim_->snapshot(), sim_->periodic() ? c_.box.width : 0.0, sim_->periodic() ? c_.box.depth : 0.0);
+  }
+
   // Limits are found anew every so many steps, and where the bed has become clearly denser or more loaded than it was:
   // plates stiffen under load, and a fast plate loads a bed in less than limits_every steps.
   bool limits_are_due(const Measures& m, bool regular) {
@@ -289,13 +303,13 @@ class Experiment {
   struct Course {
     double begun = 0.0;  // wall clock [s]
     double residual_before = 0.0, dissipated_before = 0.0;  // [J]
-    std::int64_t next_sample = 0;
+    std::int64_t next_sample = 0, next_frame = 0;
   };
 
   template <class V>
   static void each_field(V& v, Stand& stand, Stage& stage, Course& course, double& elapsed) {
     v("first_step", stand.first_step), v("first_time", stand.first_time), v("strain_zero_height", stand.strain_zero_height), v("dt_step", stand.dt_step), v("dt_time", stand.dt_time);
-    v("elapsed", elapsed), v("residual_before", course.residual_before), v("dissipated_before", course.dissipated_before), v("next_sample", course.next_sample);
+    v("elapsed", elapsed), v("residual_before", course.residual_before), v("dissipated_before", course.dissipated_before), v("next_sample", course.next_sample), v("next_frame", course.next_frame);
     std::visit([&](auto& s) { v("memory", s); }, stage);
   }
 
@@ -306,6 +320,8 @@ class Experiment {
     each_field(writer, stand, stage, course, elapsed);
     keep(std::move(state));
   }
+
+  double frame_interval(const StageSpec& spec) const { return spec.frames.value_or(c_.output.frames.value_or(0.0)); }
 
   Course begin_stage(std::size_t index, Stand& stand, Stage& stage) {
     const StageSpec& spec = c_.stages[index];
@@ -324,6 +340,8 @@ class Experiment {
     sample(index, spec.speed);
     course.residual_before = current_.last.measures.energy_residual, course.dissipated_before = current_.last.measures.ledger.dissipated();
     course.next_sample = sim_->step() + steps_to_sample();
+    if (frame_interval(spec) > 0.0) add_frame();
+    course.next_frame = step_of_next_frame(frame_interval(spec));
     return course;
   }
 
@@ -367,6 +385,7 @@ class Experiment {
         if (on_grid && !first_look && limits_are_due(m, sim_->step() % limits_grid == 0)) {
           watch_time_step(stand, m);
           if (sim_->step() < next_sample) next_sample = sim_->step() + steps_to_sample();
+          if (sim_->step() < course.next_frame) course.next_frame = step_of_next_frame(frame_interval(spec));
         }
       }
       // After the time step may have changed.
@@ -389,9 +408,13 @@ class Experiment {
         sample(index, speed);
         next_sample = sim_->step() + steps_to_sample();
       }
+      if (sim_->step() >= course.next_frame) {
+        add_frame();
+        course.next_frame = step_of_next_frame(frame_interval(spec));
+      }
       std::int64_t target = (sim_->step() / grid + 1) * grid;
       if (exact) target = std::min(target, std::max(*exact, sim_->step() + 1));
-      target = std::min(target, next_sample);
+      target = std::min({target, next_sample, course.next_frame});
       target = std::min(target, longest);
       current_.time_step.smallest = std::min(current_.time_step.smallest, sim_->time_step());
       current_.time_step.largest = std::max(current_.time_step.largest, sim_->time_step());
@@ -402,6 +425,7 @@ class Experiment {
     }
 
     sample(index, speed);
+    if (frame_interval(spec) > 0.0 && end != End::stopped) add_frame();
     const Measures& m = current_.last.measures;
     if (spec.kind == StageKind::hold && end != End::stopped && std::fabs(m.stress_top - spec.stress) > 0.02 * spec.stress)
       warn(fmt::format("the stress at its end is {}, not {}: a longer duration lets it settle", pretty(m.stress_top, "Pa"), pretty(spec.stress, "Pa")));
@@ -499,6 +523,7 @@ class Experiment {
   std::optional<double> strain_zero_height_;
   std::optional<double> last_wanted_;  // step that the look before allowed; empty at the start of a stage [s]
   double farthest_allowed_ = std::numeric_limits<double>::infinity();  // of any coordinate [m]
+  std::int64_t framed_step_ = -1;      // of the last frame
   double looked_stress_ = 0.0, looked_contacts_ = 0.0;  // largest at looks at the limits since the last regular one
   double last_progress_ = 0.0;
   std::int64_t progress_step_ = 0;
@@ -509,6 +534,8 @@ class Experiment {
 RunOutcome run_experiment(const Case& c, RunFolder& folder, const RunOptions& options, const Checkpoint* from) {
   return Experiment(c, folder, options, from).run();
 }
+
+std::size_t frames_of(const Checkpoint& checkpoint) { return nlohmann::json::parse(checkpoint.experiment).at("frames").get<std::size_t>(); }
 
 std::size_t rows_of(const Checkpoint& checkpoint) { return nlohmann::json::parse(checkpoint.experiment).at("rows").get<std::size_t>(); }
 

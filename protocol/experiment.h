@@ -76,11 +76,12 @@ void refuse_unstable_step(const Case& c);
 
 // Runs all stages. Failures of the run itself (RunError, stop requests, goals not reached) are in the outcome, with the
 // data so far written; OutputError is thrown.
-// `from`: where to go on; its folder was reopened with rows_of and stages_of.
+// `from`: where to go on; its folder was reopened with rows_of, stages_of and frames_of.
 RunOutcome run_experiment(const Case& c, RunFolder& folder, const RunOptions& options, const Checkpoint* from = nullptr);
 
-// What a checkpoint counted on: rows of the series, and the stages closed so far.
+// What a checkpoint counted on: rows of the series, frames, and the stages closed so far.
 std::size_t rows_of(const Checkpoint& checkpoint);
+std::size_t frames_of(const Checkpoint& checkpoint);
 std::vector<StageResult> stages_of(const Checkpoint& checkpoint);
 
 }  // namespace platen

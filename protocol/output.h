@@ -16,6 +16,7 @@
 #include "core/measures.h"
 #include "core/snapshot.h"
 #include "protocol/output/files.h"
+#include "protocol/output/frames.h"
 #include "protocol/output/output_error.h"
 #include "protocol/output/series_csv.h"
 #include "protocol/records.h"
@@ -68,10 +69,10 @@ class RunFolder {
   // that platen did not write is never overwritten by another text.
   static RunFolder create(const std::filesystem::path& folder, const std::string& case_text, bool force);
 
-  // Takes up the folder of an interrupted run: keeps the first `rows` rows of series.csv (empty: all whole rows) and the
-  // stages closed so far, both as noted by the checkpoint.
+  // Takes up the folder of an interrupted run: keeps the first `rows` rows of series.csv (empty: all whole rows), the stages
+  // closed so far and the first `frames` frames, all as noted by the checkpoint.
   static RunFolder reopen(const std::filesystem::path& folder, std::optional<std::size_t> rows,
-                          std::vector<StageResult> closed);
+                          std::vector<StageResult> closed, std::size_t frames = 0);
 
   // Whether a process works in the folder at this moment.
   static bool in_use(const std::filesystem::path& folder);
@@ -83,6 +84,10 @@ class RunFolder {
   const SeriesTable& series() const { return series_.table(); }
   std::size_t rows() const { return series_.table().rows(); }
   void sync() { series_.sync(); }  // rows are on disk before it returns; call it before a checkpoint counts on them
+
+  // One more frame: frames/NUMBER.hdf, and frames.hdf.series with it.
+  void add_frame(const Snapshot& snapshot, double width, double depth);
+  std::size_t frames() const { return frames_.size(); }
 
   // Rewrites results.h5 with this stage added. `snapshot` and `profile` are those of the stage's end.
   void close_stage(const StageResult& stage, const Snapshot& snapshot, const Profile& profile);
@@ -105,6 +110,7 @@ class RunFolder {
   RunInfo info_;
   std::string start_time_;  // ISO 8601
   std::vector<StageResult> closed_;
+  std::vector<Frame> frames_;
 };
 
 // The table at the end of a run, at most 100 columns wide, ends with a newline: one line per stage, then strength and

@@ -139,9 +139,6 @@ int run_command(const RunCommand& command) {
   if (!command.quiet)
     spdlog::info("{}: {} spheres, {} stages, {} thread{}, into {}", command.case_file.filename().string(), c.particles.count,
                  c.stages.size(), options.threads, options.threads == 1 ? "" : "s", path.string());
-  const auto wants_frames = [](const StageSpec& stage) { return stage.frames.value_or(0.0) > 0.0; };
-  if (c.output.frames || std::any_of(c.stages.begin(), c.stages.end(), wants_frames))
-    spdlog::warn("{}: output.frames: this version does not write frames yet; everything else is written", command.case_file.filename().string());
   Course course{c, folder, options, nullptr, command.report, command.json, command.quiet};
   return carry_out(course);
 }
@@ -163,7 +160,7 @@ int resume_command(const ResumeCommand& command) {
   if (!command.stop_after.empty()) options.stop_after = stage_named(c, command.stop_after);
   catch_stop_signals(command.quiet);
   make_simulation(c, from, 1);  // fails before the folder is touched, if it does
-  RunFolder folder = RunFolder::reopen(path, rows_of(from), stages_of(from));
+  RunFolder folder = RunFolder::reopen(path, rows_of(from), stages_of(from), frames_of(from));
   if (!passed_over.empty()) spdlog::warn("{}; going on from the checkpoint before it", passed_over);
   if (!command.quiet)
     spdlog::info("{}: {} spheres, on from step {}, {:.4g} s simulated, {} thread{}", path.string(), from.bed.id.size(), from.bed.step,

@@ -38,6 +38,8 @@ hid_t memory_type<std::int64_t>() { return H5T_NATIVE_INT64; }
 template <>
 hid_t memory_type<std::int32_t>() { return H5T_NATIVE_INT32; }
 template <>
+hid_t memory_type<std::uint8_t>() { return H5T_NATIVE_UINT8; }
+template <>
 hid_t memory_type<std::int8_t>() { return H5T_NATIVE_INT8; }
 
 template <class T>
@@ -48,6 +50,8 @@ template <>
 hid_t file_type<std::int64_t>() { return H5T_STD_I64LE; }
 template <>
 hid_t file_type<std::int32_t>() { return H5T_STD_I32LE; }
+template <>
+hid_t file_type<std::uint8_t>() { return H5T_STD_U8LE; }
 template <>
 hid_t file_type<std::int8_t>() { return H5T_STD_I8LE; }
 
@@ -167,6 +171,7 @@ void Hdf5Group::write(const std::string& name, const std::vector<T>& values, int
 template void Hdf5Group::write(const std::string&, const std::vector<double>&, int, const Hdf5Meaning&);
 template void Hdf5Group::write(const std::string&, const std::vector<std::int64_t>&, int, const Hdf5Meaning&);
 template void Hdf5Group::write(const std::string&, const std::vector<std::int32_t>&, int, const Hdf5Meaning&);
+template void Hdf5Group::write(const std::string&, const std::vector<std::uint8_t>&, int, const Hdf5Meaning&);
 
 template <class T>
 void Hdf5Group::write_codes(const std::string& name, const std::vector<T>& values, const Hdf5Codes& codes,
@@ -264,6 +269,20 @@ void Hdf5Group::attribute(const std::string& name, std::int64_t value) {
 }
 void Hdf5Group::attribute(const std::string& name, std::uint64_t value) {
   write_attribute(id_.get(), name, H5T_STD_U64LE, H5T_NATIVE_UINT64, &value);
+}
+
+void Hdf5Group::attribute(const std::string& name, const std::vector<std::int64_t>& values) {
+  const hsize_t size = values.size();
+  const Hdf5Id space = checked(H5Screate_simple(1, &size, nullptr), H5Sclose, name);
+  const Hdf5Id attribute = checked(H5Acreate2(id_.get(), name.c_str(), H5T_STD_I64LE, space.get(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose, name);
+  check(H5Awrite(attribute.get(), H5T_NATIVE_INT64, values.data()), name);
+}
+
+void Hdf5Group::ascii_attribute(const std::string& name, const std::string& value) {
+  const Hdf5Id type = checked(H5Tcopy(H5T_C_S1), H5Tclose, name);
+  check(H5Tset_size(type.get(), value.size()), name);
+  check(H5Tset_strpad(type.get(), H5T_STR_NULLPAD), name);
+  write_attribute(id_.get(), name, type.get(), type.get(), value.data());
 }
 
 void Hdf5Group::attribute(const std::string& name, bool value) {

@@ -61,7 +61,7 @@ class Hdf5Group {
   bool is_group(const std::string& name) const;
   std::vector<std::string> names() const;           // of the members, alphabetical
 
-  // Values in rows of `columns` numbers: shape N (columns = 1) or N x columns. T: double, std::int64_t, std::int32_t.
+  // Values in rows of `columns` numbers: shape N (columns = 1) or N x columns. T: double, std::int64_t, std::int32_t, std::uint8_t.
   template <class T>
   void write(const std::string& name, const std::vector<T>& values, int columns, const Hdf5Meaning& meaning);
   // An enumeration, shape N. T: std::int8_t or std::int32_t.
@@ -81,6 +81,8 @@ class Hdf5Group {
   void attribute(const std::string& name, std::int64_t value);
   void attribute(const std::string& name, std::uint64_t value);
   void attribute(const std::string& name, bool value);
+  void attribute(const std::string& name, const std::vector<std::int64_t>& values);
+  void ascii_attribute(const std::string& name, const std::string& value);  // of fixed length, for readers that want it so
   // A text attribute of the member `object` ("." = the group itself); empty when there is none.
   std::string text_attribute(const std::string& object, const std::string& name) const;
   std::int64_t integer_attribute(const std::string& object, const std::string& name, std::int64_t otherwise) const;

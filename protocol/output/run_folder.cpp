@@ -153,7 +153,7 @@ RunFolder RunFolder::create(const fs::path& folder, const std::string& case_text
 }
 
 RunFolder RunFolder::reopen(const fs::path& folder, std::optional<std::size_t> rows,
-                            std::vector<StageResult> closed) try {
+                            std::vector<StageResult> closed, std::size_t frames) try {
   if (!fs::exists(folder / "case.toml")) throw OutputError(folder.string() + ": holds no run");
   UniqueFd held = lock(folder);
   std::string case_text = read_whole_file(folder / "case.toml");
@@ -164,6 +164,9 @@ RunFolder RunFolder::reopen(const fs::path& folder, std::optional<std::size_t> r
   AppendFile log = AppendFile::reopen(log_path, old_log.rfind('\n') == std::string::npos ? 0 : old_log.rfind('\n') + 1);
   RunFolder run(folder, std::move(held), std::move(case_text), std::move(series), std::move(log));
   run.closed_ = std::move(closed);
+  if (frames > 0) run.frames_ = read_frame_series(folder / "frames.hdf.series");
+  if (run.frames_.size() < frames) throw OutputError((folder / "frames.hdf.series").string() + ": has fewer frames than the checkpoint counted");
+  run.frames_.resize(frames);
   if (const std::string start = start_time_of(folder / "results.h5"); !start.empty()) run.start_time_ = start;
   // Until this run finishes, the summary of an earlier end is not true any more.
   fs::remove(folder / "summary.json");
@@ -181,6 +184,16 @@ void RunFolder::close_stage(const StageResult& stage, const Snapshot& snapshot, 
     closed_.pop_back();  // the file still holds the stages before this one
     throw;
   }
+}
+
+void RunFolder::add_frame(const Snapshot& snapshot, double width, double depth) {
+  std::string number = std::to_string(frames_.size());
+  number.insert(0, number.size() < 6 ? 6 - number.size() : 0, '0');
+  const Frame frame{"frames/" + number + ".hdf", snapshot.time};
+  fs::create_directories(path_ / "frames");
+  write_frame(path_ / frame.name, snapshot, info_.contacts, width, depth);
+  frames_.push_back(frame);
+  write_frame_series(path_ / "frames.hdf.series", frames_);
 }
 
 void RunFolder::finish(int exit_code, std::optional<std::uint64_t> state_hash, const Performance& performance,
