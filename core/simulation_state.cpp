@@ -33,7 +33,7 @@ SimulationState Simulation::whole_state() {
   std::sort(s.pairs.begin(), s.pairs.end(), [](const PairHistory& a, const PairHistory& b) { return std::tie(a.low, a.high) < std::tie(b.low, b.high); });
   s.plates = plate_history(batches_, p);
   s.planes = planes_;
-  s.forces_valid = forces_valid_;
+  s.forces_valid = forces_valid_, s.forces_dt = law_.dt;
   s.sides_open = !periodic();
   s.step = step_, s.step_base = step_base_;
   s.dt = dt_, s.last_drift = last_drift_, s.time_base = time_base_;
@@ -82,7 +82,7 @@ void Simulation::take_up(const SimulationState& s) {
   sums.resize(s.sums.size());
   std::copy(s.sums.begin(), s.sums.end(), sums.data());
   rebuild_from(pairs, s.plates, &sums);
-  forces_valid_ = s.forces_valid;
+  forces_valid_ = s.forces_valid, law_.dt = plate_law_.dt = s.forces_dt;
   counters_.rebuilds = s.rebuilds, counters_.prunes = s.prunes, counters_.redone_steps = s.redone_steps;
 }
 

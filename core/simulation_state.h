@@ -24,6 +24,7 @@ struct SimulationState {
   std::vector<PlateHistory> plates;     // sorted by (plate, rank)
   Planes planes;
   bool forces_valid = true;             // false: something other than motion changed since `sums` were found
+  double forces_dt = 0.0;               // [s] by which springs were stretched when `sums` were found; 0 where nothing had moved
   bool sides_open = false;              // periodic sides were taken away
   std::int64_t step = 0, step_base = 0; // time = time_base + (step - step_base) dt
   double dt = 0.0, last_drift = 0.0, time_base = 0.0;  // [s]

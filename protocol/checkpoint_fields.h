@@ -49,7 +49,7 @@ void each(V& v, T& r) {
 template <class V, class T>
   requires std::is_same_v<std::remove_const_t<T>, StepRange>
 void each(V& v, T& r) {
-  v("smallest", r.smallest), v("largest", r.largest), v("dt_crit", r.dt_crit), v("dt_limit", r.dt_limit), v("ruled_by", r.ruled_by);
+  v("smallest", r.smallest), v("largest", r.largest), v("dt_crit", r.dt_crit), v("dt_limit", r.dt_limit), v("largest_share", r.largest_share), v("ruled_by", r.ruled_by);
 }
 
 template <class V, class T>

@@ -60,7 +60,6 @@ class Experiment {
         }
       }
       outcome.state_hash = sim_->state_hash(stage_state());
-      if (outcome.exit_code == exit_done && closed_.size() == c_.stages.size()) remove_checkpoints(folder_.path());  // nothing is left to do
     } catch (const RunError& error) {
       outcome.exit_code = exit_numerical;
       outcome.message = error.what();
@@ -79,6 +78,7 @@ class Experiment {
     folder_.finish(outcome.exit_code, outcome.exit_code == exit_numerical ? std::nullopt : std::optional(outcome.state_hash),
                    outcome.performance, outcome.stages);
     folder_.log("end", {{"exit_code", outcome.exit_code}, {"wall_seconds", now() - wall_begin_}});
+    if (outcome.exit_code == exit_done && closed_.size() == c_.stages.size()) remove_checkpoints(folder_.path());  // nothing is left to do
     return outcome;
   }
 
@@ -131,6 +131,7 @@ class Experiment {
     Checkpoint checkpoint;
     checkpoint.bed = sim_->whole_state();
     checkpoint.experiment = experiment.dump();
+    checkpoint.case_text = c_.text, checkpoint.start_time = folder_.start_time();
     checkpoint.instruction_set = to_string(sim_->kernels().instruction_set);
     checkpoint.reproducible = from_ ? from_->reproducible : options_.reproducible;
     if (from_) checkpoint.density = from_->density;
@@ -140,9 +141,10 @@ class Experiment {
       write_checkpoint(folder_.path(), checkpoint);
       kept_step_ = sim_->step();
       folder_.log("checkpoint", {{"step", sim_->step()}, {"seconds", now() - begin}});
-    } catch (const OutputError& error) {  // the run itself can go on, with the older one
+    } catch (const std::exception& error) {  // the run itself can go on, with the older one
       folder_.log("checkpoint failed", {{"message", error.what()}}, LogLevel::warning);
-      if (std::find(current_.warnings.begin(), current_.warnings.end(), no_checkpoint) == current_.warnings.end()) current_.warnings.push_back(no_checkpoint);
+      std::vector<std::string>& warnings = stage_open_ ? current_.warnings : closed_.back().warnings;
+      if (std::find(warnings.begin(), warnings.end(), no_checkpoint) == warnings.end()) warnings.push_back(no_checkpoint);
     }
     kept_at_ = now(), keeping_takes_ = kept_at_ - begin;
   }
@@ -257,9 +259,13 @@ class Experiment {
       warn(sim_->time_step() > limits.dt_limit ? "time step above dt_limit for a while" : "time step above 0.9 dt_limit for a while");
     StepRange& range = current_.time_step;
     range.dt_crit = std::min(range.dt_crit, limits.dt_crit), range.dt_limit = std::min(range.dt_limit, limits.dt_limit);
-    if (std::isfinite(limits.dt_limit))
-      folder_.log("limits", {{"step", sim_->step()}, {"dt", sim_->time_step()}, {"dt_crit", limits.dt_crit}, {"dt_pairs", limits.dt_pairs}, {"dt_limit", limits.dt_limit}});
+    if (std::isfinite(limits.dt_limit)) range.largest_share = std::max(range.largest_share, sim_->time_step() / limits.dt_limit);
+    const auto log_limits = [&] {  // with the step that holds from now on
+      if (std::isfinite(limits.dt_limit))
+        folder_.log("limits", {{"step", sim_->step()}, {"dt", sim_->time_step()}, {"dt_crit", limits.dt_crit}, {"dt_pairs", limits.dt_pairs}, {"dt_limit", limits.dt_limit}});
+    };
     if (c_.time.step) {
+      log_limits();
       const double ratio = sim_->time_step() / limits.dt_limit;
       if (ratio > 1.0 && !c_.time.allow_unstable) {
         std::string ruled_by;
@@ -282,6 +288,7 @@ class Experiment {
     last_wanted_ = wanted;
     const bool loose = kind == StageKind::fill || kind == StageKind::vibrate;
     sim_->set_time_step(loose ? std::min(now, wanted) : allowed);
+    log_limits();
     stand.time_step_changed();
   }
 
@@ -450,6 +457,7 @@ class Experiment {
       const StepLimits limits = sim_->step_limits(current_.time_step.ruled_by);
       current_.time_step.dt_crit = std::min(current_.time_step.dt_crit, limits.dt_crit);
       current_.time_step.dt_limit = std::min(current_.time_step.dt_limit, limits.dt_limit);
+      if (std::isfinite(limits.dt_limit)) current_.time_step.largest_share = std::max(current_.time_step.largest_share, sim_->time_step() / limits.dt_limit);
       if (c_.time.step && sim_->time_step() > 0.9 * limits.dt_limit) warn(sim_->time_step() > limits.dt_limit ? "time step above dt_limit" : "time step above 0.9 dt_limit");
       std::visit([&](auto& s) { s.end(stand, current_); }, stage);
     }
@@ -535,14 +543,15 @@ RunOutcome run_experiment(const Case& c, RunFolder& folder, const RunOptions& op
   return Experiment(c, folder, options, from).run();
 }
 
-std::size_t frames_of(const Checkpoint& checkpoint) { return nlohmann::json::parse(checkpoint.experiment).at("frames").get<std::size_t>(); }
-
-std::size_t rows_of(const Checkpoint& checkpoint) { return nlohmann::json::parse(checkpoint.experiment).at("rows").get<std::size_t>(); }
-
-std::vector<StageResult> stages_of(const Checkpoint& checkpoint) {
-  std::vector<StageResult> closed;
-  fields::from_json(nlohmann::json::parse(checkpoint.experiment).at("closed"), closed);
-  return closed;
+CheckpointFacts facts_of(const Checkpoint& checkpoint) try {
+  const nlohmann::json experiment = nlohmann::json::parse(checkpoint.experiment);
+  CheckpointFacts facts;
+  facts.rows = experiment.at("rows").get<std::size_t>(), facts.frames = experiment.at("frames").get<std::size_t>();
+  facts.stage = experiment.at("stage").at("index").get<std::size_t>();
+  fields::from_json(experiment.at("closed"), facts.closed);
+  return facts;
+} catch (const nlohmann::json::exception& error) {
+  throw OutputError(std::string("the checkpoint does not fit this version of platen: ") + error.what());
 }
 
 }  // namespace platen

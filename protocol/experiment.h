@@ -76,12 +76,15 @@ void refuse_unstable_step(const Case& c);
 
 // Runs all stages. Failures of the run itself (RunError, stop requests, goals not reached) are in the outcome, with the
 // data so far written; OutputError is thrown.
-// `from`: where to go on; its folder was reopened with rows_of, stages_of and frames_of.
+// `from`: where to go on; its folder was reopened with facts_of.
 RunOutcome run_experiment(const Case& c, RunFolder& folder, const RunOptions& options, const Checkpoint* from = nullptr);
 
-// What a checkpoint counted on: rows of the series, frames, and the stages closed so far.
-std::size_t rows_of(const Checkpoint& checkpoint);
-std::size_t frames_of(const Checkpoint& checkpoint);
-std::vector<StageResult> stages_of(const Checkpoint& checkpoint);
+// What a checkpoint counted on. Throws OutputError.
+struct CheckpointFacts {
+  std::size_t rows = 0, frames = 0;    // of series.csv, frames.hdf.series
+  std::size_t stage = 0;               // to go on with, from 0
+  std::vector<StageResult> closed;
+};
+CheckpointFacts facts_of(const Checkpoint& checkpoint);
 
 }  // namespace platen

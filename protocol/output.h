@@ -72,12 +72,19 @@ class RunFolder {
   // Takes up the folder of an interrupted run: keeps the first `rows` rows of series.csv (empty: all whole rows), the stages
   // closed so far and the first `frames` frames, all as noted by the checkpoint.
   static RunFolder reopen(const std::filesystem::path& folder, std::optional<std::size_t> rows,
-                          std::vector<StageResult> closed, std::size_t frames = 0);
+                          std::vector<StageResult> closed, std::size_t frames = 0) {
+    return reopen(hold(folder), folder, rows, std::move(closed), frames);
+  }
+  // The same with the lock in hand, for those who must look at the folder before.
+  static UniqueFd hold(const std::filesystem::path& folder);
+  static RunFolder reopen(UniqueFd held, const std::filesystem::path& folder, std::optional<std::size_t> rows,
+                          std::vector<StageResult> closed, std::size_t frames, const std::string& start_time = {});
 
   // Whether a process works in the folder at this moment.
   static bool in_use(const std::filesystem::path& folder);
 
   const std::filesystem::path& path() const { return path_; }
+  const std::string& start_time() const { return start_time_; }  // of the run, ISO 8601
   void set_info(RunInfo info) { info_ = std::move(info); }  // before the first close_stage
 
   void append(const SeriesRow& row, int stage) { series_.append(row, stage); }  // one row of series.csv; stages from 0

@@ -25,6 +25,7 @@ struct SeriesRow {
 struct StepRange {
   double smallest = std::numeric_limits<double>::infinity(), largest = 0.0;
   double dt_crit = std::numeric_limits<double>::infinity(), dt_limit = std::numeric_limits<double>::infinity();
+  double largest_share = 0.0;  // of the step over the limit of the same moment, as they were found
   std::string ruled_by;  // contact that rules at the end of the stage; empty without contacts
 };
 

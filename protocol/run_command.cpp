@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "kernels/kernel_table.h"
 #include "protocol/experiment.h"
@@ -75,6 +76,13 @@ std::string stage_named(const Case& c, const std::string& text) {
 }
 
 namespace {
+
+// Whether a run ended well, and not only as far as somebody had asked for.
+bool all_stages_done(const fs::path& folder, const Case& c) {
+  if (!fs::exists(folder / "summary.json")) return false;
+  const nlohmann::json summary = nlohmann::json::parse(read_whole_file(folder / "summary.json"), nullptr, false);
+  return summary.is_object() && summary.value("exit_code", -1) == exit_done && summary.contains("stages") && summary["stages"].size() >= c.stages.size();
+}
 
 // What both commands do once the folder is theirs.
 struct Course {
@@ -146,21 +154,31 @@ int run_command(const RunCommand& command) {
 int resume_command(const ResumeCommand& command) {
   const fs::path& path = command.folder;
   if (!fs::exists(path / "case.toml") || !fs::exists(path / "series.csv")) throw OutputError(path.string() + ": is not a run folder");
-  if (fs::exists(path / "summary.json") && run_state(path).good && !fs::exists(path / "checkpoint.h5") && !fs::exists(path / "checkpoint.prev.h5")) {
-    if (!command.quiet) spdlog::info("{}: {}; nothing is left to do", path.string(), run_state(path).text);
+  // In hand before anything is read: whoever is still at work there writes the last checkpoint first.
+  UniqueFd held = RunFolder::hold(path);
+  const Case c = read_case(path / "case.toml", {}, CaseUse::resume);
+  if (!has_checkpoint(path) && all_stages_done(path, c)) {
+    if (command.json) print(read_whole_file(path / "summary.json"));
+    else if (!command.quiet) spdlog::info("{}: {}; nothing is left to do", path.string(), run_state(path).text);
     return exit_done;
   }
-  const Case c = read_case(path / "case.toml", {}, CaseUse::resume);
   std::string passed_over;
   const Checkpoint from = newest_checkpoint(path, passed_over);
+  if (c.text != from.case_text)
+    throw CaseError(fmt::format("{}: is not the case that the run was begun with; put that back (it is in results.h5, /case), or begin anew with `platen run`", (path / "case.toml").string()));
+  const CheckpointFacts facts = facts_of(from);
   RunOptions options;
   options.threads = command.threads.value_or(usable_cores());
   options.reproducible = from.reproducible;
   options.max_walltime = command.max_walltime;
-  if (!command.stop_after.empty()) options.stop_after = stage_named(c, command.stop_after);
+  if (!command.stop_after.empty()) {
+    options.stop_after = stage_named(c, command.stop_after);
+    for (std::size_t k = 0; k < facts.stage && k < c.stages.size(); ++k)
+      if (c.stages[k].name == options.stop_after) throw UsageError(fmt::format("--stop-after: the run has left stage \"{}\" behind; it goes on with \"{}\"", options.stop_after, c.stages[std::min(facts.stage, c.stages.size() - 1)].name));
+  }
   catch_stop_signals(command.quiet);
   make_simulation(c, from, 1);  // fails before the folder is touched, if it does
-  RunFolder folder = RunFolder::reopen(path, rows_of(from), stages_of(from), frames_of(from));
+  RunFolder folder = RunFolder::reopen(std::move(held), path, facts.rows, facts.closed, facts.frames, from.start_time);
   if (!passed_over.empty()) spdlog::warn("{}; going on from the checkpoint before it", passed_over);
   if (!command.quiet)
     spdlog::info("{}: {} spheres, on from step {}, {:.4g} s simulated, {} thread{}", path.string(), from.bed.id.size(), from.bed.step,

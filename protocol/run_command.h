@@ -44,8 +44,8 @@ struct ResumeCommand {
   bool report = true, json = false, quiet = false;  // as of RunCommand
 };
 
-// Goes on with a run that was stopped or killed, from its newest whole checkpoint. A run that is done is left alone, exit code
-// 0. Throws UsageError, CaseError for a case that was changed, OutputError.
+// Goes on with a run that was stopped or killed, from its newest whole checkpoint. A run of which all stages are done is left
+// alone, exit code 0. Throws UsageError, CaseError for a case that was changed, OutputError.
 int resume_command(const ResumeCommand& command);
 
 }  // namespace platen

@@ -61,7 +61,7 @@ TEST_F(Report, ThePageHoldsTheRun) {
   for (std::size_t k = 0; k < 120; ++k)
     EXPECT_NEAR(unit * beds.at(2).at("position").at(k).get<double>(), snapshot(2).particles.position[k], 0.5 * unit);
   EXPECT_FALSE(beds.at(0).contains("moved"));
-  EXPECT_EQ(run.at("profiles").size(), 4u);
+  for (const Json& stage : run.at("stages")) EXPECT_TRUE(stage.contains("profile")) << stage.at("name");
 }
 
 TEST_F(Report, NeedsNothingElse) {
@@ -104,12 +104,35 @@ TEST_F(Report, ARunThatWasKilled) {
   EXPECT_EQ(run.at("beds").size(), 2u);
 }
 
+// A name that every object has, and one with a slash: they end up in nobody's way.
+TEST_F(Report, StagesOfAnyName) {
+  {
+    RunFolder run = RunFolder::create(root / "run", "[case]\ntitle = \"odd\"\n", false);
+    run.set_info(info());
+    StageResult stage = result(0);
+    stage.name = "constructor", stage.last.stage = "constructor";
+    SeriesRow r = row(0, 0);
+    r.stage = "constructor";
+    run.append(r, 0);
+    run.close_stage(stage, snapshot(0), {});
+    stage.name = "down/up";
+    r.stage = "down/up", r.measures.step = 1;
+    run.append(r, 1);
+    run.close_stage(stage, snapshot(1), profile(snapshot(1), 1.0, 3));
+  }
+  const Json run = data_of(report_page({root / "run"})).at(0);
+  EXPECT_FALSE(run.at("stages").at(0).contains("profile"));
+  EXPECT_EQ(run.at("stages").at(1).at("profile").at("porosity").size(), 3u);
+  EXPECT_EQ(run.at("beds").at(1).at("since"), "constructor");
+}
+
 TEST_F(Report, LongSeriesAreThinned) {
   {
     RunFolder run = RunFolder::create(root / "run", case_text, false);
     SeriesRow r = row(0, 0);
     for (int k = 0; k < 10001; ++k) {
       r.measures.step = k, r.measures.time = 1e-5 * k, r.stage = stage_names()[k < 7000 ? 0 : 1];
+      r.measures.stress_top = k == 8765 ? 9e4 : 1e3 + 7 * (k % 11);
       run.append(r, k < 7000 ? 0 : 1);
     }
   }
@@ -122,6 +145,10 @@ TEST_F(Report, LongSeriesAreThinned) {
   const auto second = static_cast<std::size_t>(std::find(stage.begin(), stage.end(), 1) - stage.begin());
   EXPECT_EQ(series.at("time").at(second), 0.07);       // the first row of a stage
   EXPECT_EQ(series.at("time").at(second - 1), 0.06999);  // the last one of the stage before
+  const std::vector<double> stress = series.at("stress_top");
+  EXPECT_EQ(*std::max_element(stress.begin(), stress.end()), 9e4) << "a peak of one row is lost";
+  const std::vector<double> time = series.at("time");
+  EXPECT_TRUE(std::is_sorted(time.begin(), time.end()));
 }
 
 TEST_F(Report, RunsOfOneNameAreToldApart) {
@@ -154,22 +181,35 @@ TEST_F(Report, OnTheCommandLine) {
   EXPECT_EQ(result.exit_code, 5) << result.report();
 }
 
-// Chromium's own console says nothing, and everything that the page is to show is there.
-TEST_F(Report, DrawsInABrowser) {
-  const std::string chromium = PLATEN_CHROMIUM;
-  if (chromium.empty()) GTEST_SKIP() << "chromium is not installed";
-  write_run(root / "run");
-  write_report(root / "run");
+// Opens a page in Chromium; what its console says, and the page as it is then.
+struct Drawn {
+  std::string console, page;
+};
+
+Drawn draw(const fs::path& page, const fs::path& home) {
   test::ProgramOptions browser;
-  browser.program = chromium;
+  browser.program = PLATEN_CHROMIUM;
   browser.timeout = 120.0;
-  browser.environment = {{"HOME", root.string()}};
+  browser.environment = {{"HOME", home.string()}};
   const test::ProgramResult result =
       test::run_program({"--headless", "--no-sandbox", "--disable-dev-shm-usage", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--enable-logging=stderr",
-                         "--virtual-time-budget=5000", "--window-size=1200,900", "--dump-dom", "file://" + (root / "run/report.html").string()}, browser);
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_EQ(result.err.find("CONSOLE"), std::string::npos) << result.err;
-  const std::string page = result.out.substr(0, result.out.find("<script"));  // what was drawn comes first
+                         "--virtual-time-budget=5000", "--window-size=1200,900", "--dump-dom", "file://" + page.string()}, browser);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  Drawn drawn;
+  std::istringstream lines(result.err);
+  for (std::string line; std::getline(lines, line);)
+    if (line.find("CONSOLE") != std::string::npos) drawn.console += line + "\n";
+  drawn.page = result.out.substr(0, result.out.find("<script"));  // what was drawn comes first
+  return drawn;
+}
+
+TEST_F(Report, DrawsInABrowser) {
+  if (std::string(PLATEN_CHROMIUM).empty()) GTEST_SKIP() << "chromium is not installed";
+  write_run(root / "run");
+  write_report(root / "run");
+  const Drawn drawn = draw(root / "run/report.html", root);
+  EXPECT_EQ(drawn.console, "");
+  const std::string& page = drawn.page;
   for (const char* id : {"confined", "crush", "porosity", "coordination", "profile", "time", "rest", "energy"})
     EXPECT_EQ(count(page, "id=\"plot-" + std::string(id) + "\""), 1u) << id;
   EXPECT_NE(page.find("5.43 kPa"), std::string::npos);
@@ -179,6 +219,26 @@ TEST_F(Report, DrawsInABrowser) {
   ASSERT_NE(view, std::string::npos);
   EXPECT_NE(page.find("<canvas", view), std::string::npos) << page.substr(view, 300);
   EXPECT_EQ(page.find("cannot be drawn"), std::string::npos);
+}
+
+// A comparison whose reader looks at another run, and drags a frame in a plot: the page with a few lines that do so.
+TEST_F(Report, AReaderMayChooseAndZoom) {
+  if (std::string(PLATEN_CHROMIUM).empty()) GTEST_SKIP() << "chromium is not installed";
+  write_run(root / "a");
+  write_run(root / "b");
+  std::string page = report_page({root / "a", root / "b"});
+  const std::string reader =
+      "<script>(function () { const select = document.querySelector('#choice select');"
+      "for (const k of [1, 0, 1]) { select.value = k; select.dispatchEvent(new Event('change')); }"
+      "for (const canvas of document.querySelectorAll('canvas')) { const box = canvas.getBoundingClientRect();"
+      "const mouse = (type, x, y, on) => on.dispatchEvent(new MouseEvent(type, { bubbles: true, clientX: box.left + x * box.width, clientY: box.top + y * box.height }));"
+      "mouse('mousedown', 0.3, 0.3, canvas); mouse('mousemove', 0.6, 0.6, canvas); mouse('mouseup', 0.7, 0.7, window); mouse('dblclick', 0.5, 0.5, canvas); }"
+      "document.title = 'read'; console.log = null; })();</script>\n</body>";
+  page.replace(page.rfind("</body>"), 7, reader);
+  put(root / "page.html", page);
+  const Drawn drawn = draw(root / "page.html", root);
+  EXPECT_EQ(drawn.console, "");
+  EXPECT_NE(drawn.page.find("<title>read</title>"), std::string::npos) << "the reader did not come to the end";
 }
 
 }  // namespace

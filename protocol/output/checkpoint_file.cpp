@@ -41,6 +41,8 @@ void write_content(const fs::path& path, const Checkpoint& c) {
     root.attribute("version", PLATEN_VERSION);
     root.attribute("instruction_set", c.instruction_set);
     root.attribute("reproducible", static_cast<std::int64_t>(c.reproducible));
+    root.attribute("start_time", c.start_time);
+    root.write_text("case", c.case_text, {"-", "the case (TOML)"});
     root.write_text("experiment", c.experiment, {"-", "where the stages stand, JSON"});
 
     Hdf5Group spheres = root.create_group("spheres");
@@ -83,8 +85,8 @@ void write_content(const fs::path& path, const Checkpoint& c) {
     Hdf5Group totals = root.create_group("totals");
     totals.write("steps", std::vector<std::int64_t>{s.step, s.step_base, s.contacts, s.rebuilds, s.prunes, s.redone_steps, s.sides_open ? 1 : 0, s.forces_valid ? 1 : 0}, 1,
                  {"-", "step, step at which dt began to hold, touching pairs, rebuilds, prunes, steps done twice, sides open, forces found"});
-    totals.write("times", std::vector<double>{s.dt, s.last_drift, s.time_base, s.inserted, s.removed}, 1,
-                 {"-", "dt, last dt, time at which dt began to hold [s], inserted, removed energy [J]"});
+    totals.write("times", std::vector<double>{s.dt, s.last_drift, s.time_base, s.inserted, s.removed, s.forces_dt}, 1,
+                 {"-", "dt, last dt, time at which dt began to hold [s], inserted, removed energy [J], dt of the forces [s]"});
     std::vector<std::int64_t> quanta;
     for (const Int128 x : s.dissipated) put(quanta, x);
     put(quanta, s.rolling), put(quanta, s.plate_work);
@@ -118,7 +120,8 @@ void write_checkpoint(const fs::path& folder, const Checkpoint& checkpoint) {
   // Whole on disk before the older ones are touched; between the two renames there is the former one alone.
   write_whole_file(folder / unnamed, bytes);
   std::error_code error;
-  if (fs::exists(path)) fs::rename(path, folder / former, error);
+  // A damaged one never takes the place of a whole one.
+  if (fs::exists(path) && checkpoint_is_whole(read_whole_file(path))) fs::rename(path, folder / former, error);
   rename_into_place(folder / unnamed, path);
 }
 
@@ -132,12 +135,15 @@ Checkpoint read_checkpoint(const fs::path& path) {
     throw OutputError(path.string() + ": is damaged, or no checkpoint");
   const Hdf5File file = Hdf5File::open(path);
   const Hdf5Group root = file.root();
-  if (root.integer_attribute(".", "format", 0) != format) throw OutputError(path.string() + ": was written by another version of platen");
+  const std::string version = root.text_attribute(".", "version");
+  if (root.integer_attribute(".", "format", 0) != format || version != PLATEN_VERSION)
+    throw OutputError(fmt::format("{}: was written by platen {}, this is {}; only the same version goes on with the same bits", path.string(), version.empty() ? "of another kind" : version, PLATEN_VERSION));
   Checkpoint c;
   SimulationState& s = c.bed;
   c.instruction_set = root.text_attribute(".", "instruction_set");
   c.reproducible = root.integer_attribute(".", "reproducible", 0) != 0;
-  c.experiment = root.read_text("experiment");
+  c.start_time = root.text_attribute(".", "start_time");
+  c.case_text = root.read_text("case"), c.experiment = root.read_text("experiment");
   const Hdf5Group spheres = root.group("spheres");
   s.id = spheres.read<std::int64_t>("id");
   const std::size_t n = s.id.size();
@@ -169,8 +175,8 @@ Checkpoint read_checkpoint(const fs::path& path) {
   const Hdf5Group totals = root.group("totals");
   const auto steps = read<std::int64_t>(totals, "steps", 8, path);
   s.step = steps[0], s.step_base = steps[1], s.contacts = steps[2], s.rebuilds = steps[3], s.prunes = steps[4], s.redone_steps = steps[5], s.sides_open = steps[6] != 0, s.forces_valid = steps[7] != 0;
-  const auto times = read<double>(totals, "times", 5, path);
-  s.dt = times[0], s.last_drift = times[1], s.time_base = times[2], s.inserted = times[3], s.removed = times[4];
+  const auto times = read<double>(totals, "times", 6, path);
+  s.dt = times[0], s.last_drift = times[1], s.time_base = times[2], s.inserted = times[3], s.removed = times[4], s.forces_dt = times[5];
   const auto quanta = read<std::int64_t>(totals, "energies", 2 * (term_count + 2), path);
   for (std::size_t k = 0; k < term_count; ++k) s.dissipated[k] = wide(quanta, k);
   s.rolling = wide(quanta, term_count), s.plate_work = wide(quanta, term_count + 1);
@@ -179,16 +185,19 @@ Checkpoint read_checkpoint(const fs::path& path) {
 
 Checkpoint newest_checkpoint(const fs::path& folder, std::string& passed_over) {
   passed_over.clear();
-  if (!fs::exists(folder / newest) && !fs::exists(folder / former)) throw OutputError(folder.string() + ": holds no checkpoint to go on from");
-  if (!fs::exists(folder / newest)) return read_checkpoint(folder / former);
-  try {
-    return read_checkpoint(folder / newest);
-  } catch (const OutputError& error) {
-    passed_over = error.what();
-    if (!fs::exists(folder / former)) throw;
+  // The first of these is there where the machine stopped between two renames.
+  for (const char* name : {unnamed, newest, former}) {
+    if (!fs::exists(folder / name)) continue;
+    try {
+      return read_checkpoint(folder / name);
+    } catch (const OutputError& error) {
+      passed_over += (passed_over.empty() ? "" : "; ") + std::string(error.what());
+    }
   }
-  return read_checkpoint(folder / former);
+  throw OutputError(passed_over.empty() ? folder.string() + ": holds no checkpoint to go on from" : passed_over);
 }
+
+bool has_checkpoint(const fs::path& folder) { return fs::exists(folder / unnamed) || fs::exists(folder / newest) || fs::exists(folder / former); }
 
 void remove_checkpoints(const fs::path& folder) {
   std::error_code ignored;

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "protocol/output.h"
+#include "protocol/output/checkpoint_file.h"
 #include "protocol/output/results_h5.h"
 #include "protocol/output/summary_json.h"
 
@@ -24,7 +25,7 @@ constexpr const char* lock_name = ".lock";
 
 // What every run writes, and what some runs write besides frames/*.hdf.
 constexpr std::array main_files{"case.toml", "series.csv", "results.h5", "summary.json", "log.jsonl"};
-constexpr std::array other_files{"report.html", "checkpoint.h5", "checkpoint.prev.h5", "frames.hdf.series"};
+constexpr std::array other_files{"report.html", "frames.hdf.series"};
 
 // "2026-01-31T12:00:00.123Z"
 std::string now_iso8601() {
@@ -99,6 +100,7 @@ void remove_file(const fs::path& file) {
 // Removes what a former run left. Where no run was, only files go whose names this run needs.
 void remove_own_files(const fs::path& folder, bool former_run) {
   for (const char* name : main_files) remove_file(folder / name);
+  remove_checkpoints(folder);  // always: `resume` must not take those of a former run for its own
   if (!former_run) return;
   for (const char* name : other_files) remove_file(folder / name);
   const fs::path frames = folder / "frames";
@@ -152,10 +154,13 @@ RunFolder RunFolder::create(const fs::path& folder, const std::string& case_text
   throw OutputError(folder.string() + ": cannot write: " + error.code().message());
 }
 
-RunFolder RunFolder::reopen(const fs::path& folder, std::optional<std::size_t> rows,
-                            std::vector<StageResult> closed, std::size_t frames) try {
+UniqueFd RunFolder::hold(const fs::path& folder) {
   if (!fs::exists(folder / "case.toml")) throw OutputError(folder.string() + ": holds no run");
-  UniqueFd held = lock(folder);
+  return lock(folder);
+}
+
+RunFolder RunFolder::reopen(UniqueFd held, const fs::path& folder, std::optional<std::size_t> rows,
+                            std::vector<StageResult> closed, std::size_t frames, const std::string& start_time) try {
   std::string case_text = read_whole_file(folder / "case.toml");
   SeriesFile series = SeriesFile::reopen(folder / "series.csv", rows);
   // A torn last line of the log goes too.
@@ -167,7 +172,7 @@ RunFolder RunFolder::reopen(const fs::path& folder, std::optional<std::size_t> r
   if (frames > 0) run.frames_ = read_frame_series(folder / "frames.hdf.series");
   if (run.frames_.size() < frames) throw OutputError((folder / "frames.hdf.series").string() + ": has fewer frames than the checkpoint counted");
   run.frames_.resize(frames);
-  if (const std::string start = start_time_of(folder / "results.h5"); !start.empty()) run.start_time_ = start;
+  if (const std::string start = start_time.empty() ? start_time_of(folder / "results.h5") : start_time; !start.empty()) run.start_time_ = start;
   // Until this run finishes, the summary of an earlier end is not true any more.
   fs::remove(folder / "summary.json");
   return run;

@@ -52,6 +52,7 @@ Json stage_json(const StageResult& s) {
   Json step = Json::object();
   if (s.time_step.largest > 0.0) set(step, "smallest", s.time_step.smallest), set(step, "largest", s.time_step.largest);
   set(step, "smallest_dt_crit", s.time_step.dt_crit), set(step, "smallest_dt_limit", s.time_step.dt_limit);
+  if (s.time_step.largest_share > 0.0) set(step, "largest_over_dt_limit", s.time_step.largest_share);
   if (!s.time_step.ruled_by.empty()) step["ruled_by"] = s.time_step.ruled_by;
   if (!step.empty()) stage["time_step"] = step;
   if (s.bed) {

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "protocol/case_file.h"
 #include "protocol/info.h"
 #include "protocol/output/files.h"
 #include "protocol/output/hdf5_file.h"
@@ -26,7 +27,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t most_rows = 4000;       // of the series that a page carries: what a plot can show
+constexpr std::size_t most_rows = 4000, least_rows = 300;  // of the series that a page carries, of a stage at least: what a plot can show
 constexpr std::size_t most_spheres = 150000;  // in all beds together, some 3 MB of the page
 
 // Six digits, as many as a plot can show: a third of the size of the page.
@@ -40,8 +41,17 @@ Json parsed(const fs::path& file) {
   }
 }
 
+// The case, where it still reads.
+std::optional<Case> case_of(const fs::path& folder) {
+  try {
+    return read_case(folder / "case.toml", {}, CaseUse::resume);
+  } catch (const CaseError&) {
+    return std::nullopt;
+  }
+}
+
 // Of a run without a summary: its stages as far as it got, by the groups of results.h5 and the rows of the series.
-Json stages_so_far(const SeriesTable& series, const Hdf5Group* closed) {
+Json stages_so_far(const SeriesTable& series, const Hdf5Group* closed, const std::optional<Case>& c) {
   Json stages = Json::array();
   for (std::size_t s = 0; s < series.stage_names.size(); ++s) {
     const auto first = std::find(series.stage.begin(), series.stage.end(), static_cast<int>(s)) - series.stage.begin();
@@ -50,25 +60,41 @@ Json stages_so_far(const SeriesTable& series, const Hdf5Group* closed) {
     const auto a = static_cast<std::size_t>(first), b = static_cast<std::size_t>(last);
     Json stage = {{"name", series.stage_names[s]}, {"kind", series.stage_names[s]}, {"end_reason", "not ended"}, {"warnings", Json::array()}};
     const std::string group = stage_group_name(series.stage_names[s]);
-    if (closed && closed->has(group)) stage["kind"] = closed->text_attribute(group, "kind"), stage["end_reason"] = closed->text_attribute(group, "end_reason");
+    if (c)
+      for (const StageSpec& spec : c->stages)
+        if (spec.name == series.stage_names[s]) stage["kind"] = to_string(spec.kind);
+    // A stage that was stopped and goes on is in results.h5 as it was then.
+    const bool ended = b + 1 < series.rows() || (closed && closed->has(group) && static_cast<double>(closed->integer_attribute(group, "last_step", -1)) == series.column("step")[b]);
+    if (closed && closed->has(group) && ended) stage["kind"] = closed->text_attribute(group, "kind"), stage["end_reason"] = closed->text_attribute(group, "end_reason");
     stage["time"] = series.column("time")[b] - series.column("time")[a];
     stage["steps"] = series.column("step")[b] - series.column("step")[a];
-    for (std::size_t c = 0; c < series.columns.size(); ++c)
-      if (b < series.columns[c].size() && std::isfinite(series.columns[c][b])) stage["values"][series_columns()[c].name] = series.columns[c][b];
+    for (std::size_t k = 0; k < series.columns.size(); ++k)
+      if (b < series.columns[k].size() && std::isfinite(series.columns[k][b])) stage["values"][series_columns()[k].name] = series.columns[k][b];
     stages.push_back(std::move(stage));
   }
   return stages;
 }
 
-// Rows that are thinned evenly within a stage, its first and last one always among them.
+// Rows that a plot needs: each stage gets its share, first and last among them, and of each group of neighbours those of the
+// least and the largest stress, so that no peak is lost.
 std::vector<std::size_t> shown_rows(const SeriesTable& series) {
-  const std::size_t every = series.rows() / most_rows + 1;
+  const std::vector<double>& stress = series.column("stress_top");
   std::vector<std::size_t> shown;
-  std::size_t since = 0;
-  for (std::size_t k = 0; k < series.rows(); ++k) {
-    const bool first = k == 0 || series.stage[k - 1] != series.stage[k], last = k + 1 == series.rows() || series.stage[k + 1] != series.stage[k];
-    since = first ? 0 : since + 1;
-    if (last || since % every == 0) shown.push_back(k);
+  for (std::size_t first = 0; first < series.rows();) {
+    std::size_t end = first + 1;
+    while (end < series.rows() && series.stage[end] == series.stage[first]) ++end;
+    const std::size_t rows = end - first, share = std::max(least_rows, most_rows * rows / series.rows());
+    const std::size_t group = rows <= share ? 1 : (2 * rows + share - 1) / share;
+    shown.push_back(first);
+    for (std::size_t k = first + 1; k + 1 < end; k += group) {
+      const auto from = stress.begin() + static_cast<std::ptrdiff_t>(k), to = stress.begin() + static_cast<std::ptrdiff_t>(std::min(k + group, end - 1));
+      const auto [least, largest] = std::minmax_element(from, to);
+      const auto a = static_cast<std::size_t>(least - stress.begin()), b = static_cast<std::size_t>(largest - stress.begin());
+      shown.push_back(std::min(a, b));
+      if (a != b) shown.push_back(std::max(a, b));
+    }
+    if (end - 1 > first) shown.push_back(end - 1);
+    first = end;
   }
   return shown;
 }
@@ -94,7 +120,7 @@ Json series_data(const SeriesTable& series, const Json& stages, const std::vecto
   return data;
 }
 
-// From the log: the step and its limits, with the time that the series has for their step.
+// From the log: the step that was taken from each look on, and the limits found there, with the time that the series has for it.
 Json limits_data(const fs::path& log, const SeriesTable& series) {
   Json limits = Json::array();
   if (!fs::exists(log) || series.rows() == 0) return limits;
@@ -102,8 +128,10 @@ Json limits_data(const fs::path& log, const SeriesTable& series) {
   std::istringstream lines(read_whole_file(log));
   for (std::string line; std::getline(lines, line);) {
     const Json entry = Json::parse(line, nullptr, false);  // the last line of a run that was killed may be torn
-    if (!entry.is_object() || entry.value("event", "") != "limits") continue;
-    const double step = entry.value("step", 0.0);
+    if (!entry.is_object() || !entry.contains("step") || !entry["step"].is_number()) continue;
+    const std::string event = entry.value("event", "");
+    if (event != "limits" && event != "start") continue;
+    const double step = entry["step"].get<double>();
     const std::size_t above = std::min(static_cast<std::size_t>(std::upper_bound(steps.begin(), steps.end(), step) - steps.begin()), steps.size() - 1), below = above > 0 ? above - 1 : 0;
     const double share = steps[above] > steps[below] ? std::min(1.0, (step - steps[below]) / (steps[above] - steps[below])) : 0.0;
     // After an interruption the run came by here once more.
@@ -113,19 +141,20 @@ Json limits_data(const fs::path& log, const SeriesTable& series) {
       if (entry.contains(key) && entry[key].is_number()) point[key] = rounded(entry[key].get<double>());
     limits.push_back(std::move(point));
   }
+  if (!limits.empty()) limits.push_back({{"step", steps.back()}, {"time", rounded(times.back())}, {"dt", limits.back()["dt"]}});
   return limits;
 }
 
-Json profiles_data(const Hdf5Group& root) {
-  Json data = Json::object();
-  if (!root.has("profiles")) return data;
+void add_profiles(Json& data, const Hdf5Group& root) {
+  if (!root.has("profiles")) return;
   const Hdf5Group profiles = root.group("profiles");
-  for (const std::string& stage : profiles.names()) {
-    const Hdf5Group profile = profiles.group(stage);
-    for (const std::string& name : profile.names())
-      for (const double x : profile.read<double>(name)) data[stage][name].push_back(rounded(x));
+  for (Json& stage : data["stages"]) {
+    const std::string name = stage_group_name(stage.at("name").get<std::string>());
+    if (!profiles.has(name)) continue;
+    const Hdf5Group profile = profiles.group(name);
+    for (const std::string& column : profile.names())
+      for (const double x : profile.read<double>(column)) stage["profile"][column].push_back(rounded(x));
   }
-  return data;
 }
 
 std::vector<int> in_units(const std::vector<double>& lengths, double unit) {
@@ -135,7 +164,7 @@ std::vector<int> in_units(const std::vector<double>& lengths, double unit) {
 }
 
 // Positions in thousandths of the largest radius, whole numbers: nobody sees less.
-void add_beds(Json& data, const Hdf5Group& root) {
+void add_beds(Json& data, const Hdf5Group& root, const std::optional<Case>& c) {
   data["beds"] = Json::array();
   if (!root.has("stages")) return;
   const Hdf5Group stages = root.group("stages");
@@ -164,27 +193,20 @@ void add_beds(Json& data, const Hdf5Group& root) {
     names = kept;
   }
   std::vector<double> last;
+  std::string before;
   for (const std::string& name : names) {
     const Hdf5Group group = particles(name);
-    const std::vector<double> x = group.read<double>("position");
+    std::vector<double> x = group.read<double>("position");
     Json bed = {{"stage", name}, {"position", in_units(x, unit)}};
+    // Where they would be without the box around them: a way through a periodic side is no jump.
+    if (const auto image = group.read<std::int32_t>("image"); c)
+      for (std::size_t k = 0; k < n; ++k) x[3 * k] += image[2 * k] * c->box.width, x[3 * k + 1] += image[2 * k + 1] * c->box.depth;
     if (last.size() == x.size()) {
-      // How far a sphere came; a jump over a periodic side is none (the way across a half of the box is not a grain's way).
-      std::vector<double> span(3, 0.0);
-      for (std::size_t k = 0; k < x.size(); ++k) span[k % 3] = std::max(span[k % 3], x[k]);
       std::vector<double> way;
-      for (std::size_t k = 0; k < n; ++k) {
-        double square = 0.0;
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          double d = std::fabs(x[3 * k + axis] - last[3 * k + axis]);
-          if (axis < 2 && d > 0.5 * span[axis]) d = std::fabs(span[axis] - d);
-          square += d * d;
-        }
-        way.push_back(std::sqrt(square));
-      }
-      bed["moved"] = in_units(way, unit);
+      for (std::size_t k = 0; k < n; ++k) way.push_back(std::hypot(x[3 * k] - last[3 * k], x[3 * k + 1] - last[3 * k + 1], x[3 * k + 2] - last[3 * k + 2]));
+      bed["moved"] = in_units(way, unit), bed["since"] = before;
     }
-    last = x;
+    last = std::move(x), before = name;
     data["beds"].push_back(std::move(bed));
   }
 }
@@ -208,7 +230,8 @@ Json run_data(const fs::path& folder) {
     for (const char* key : {"state_hash", "version", "performance", "stages"})
       if (summary.contains(key)) data[key] = summary.at(key);
   }
-  if (!data.contains("stages")) data["stages"] = stages_so_far(series, closed ? &*closed : nullptr);
+  const std::optional<Case> c = case_of(folder);
+  if (!data.contains("stages")) data["stages"] = stages_so_far(series, closed ? &*closed : nullptr, c);
   for (Json& stage : data["stages"])
     if (!stage.contains("values")) stage["values"] = Json::object();
   // The series knows strain from its zero on, results.h5 for whole stages.
@@ -216,9 +239,8 @@ Json run_data(const fs::path& folder) {
   if (root && root->has("series") && root->group("series").has("strain")) strain.push_back(root->group("series").read<double>("strain"));
   data["series"] = series_data(series, data["stages"], strain);
   data["limits"] = limits_data(folder / "log.jsonl", series);
-  data["profiles"] = root ? profiles_data(*root) : Json::object();
   data["beds"] = Json::array();
-  if (root) add_beds(data, *root);
+  if (root) add_profiles(data, *root), add_beds(data, *root, c);
   return data;
 }
 

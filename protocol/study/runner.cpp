@@ -15,6 +15,7 @@
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 #include <thread>
 
@@ -162,10 +163,12 @@ class Runner {
     pid_t pid;
     std::size_t job;
     std::size_t attempt;  // number of the try; 0: the run itself
+    bool resumed;
+    double steps_before;         // made before it took the run up
     Clock::time_point begin;
     std::optional<double> steal;
     fs::path series;             // of its run folder
-    double spheres = 0.0, particle_steps = 0.0;  // so far
+    double spheres = 0.0, particle_steps = 0.0, own_steps = 0.0;  // particle-steps of the run so far, and of this child
     fs::file_time_type born = fs::file_time_type::clock::now();
   };
 
@@ -233,7 +236,8 @@ class Runner {
     write_whole_file(file, c.text);
     wait_until_free(folder);
     std::vector<std::string> words{"platen"};
-    if (attempt == 0 && !job.timed && can_go_on(folder, c.text))
+    const bool resumed = attempt == 0 && !job.timed && !from_the_start_.contains(k) && can_go_on(folder, c.text);
+    if (resumed)
       words.insert(words.end(), {"resume", folder.string()});
     else
       words.insert(words.end(), {"run", file.string(), "-o", folder.string(), "--force"});
@@ -241,8 +245,9 @@ class Runner {
     if (attempt > 0) words.insert(words.end(), {"--stop-after", settled_stage(c)->name});
     outcomes_[k].state = JobState::running;
     const std::optional<double> steal = job.timed ? steal_seconds() : std::nullopt;
+    const auto steps_before = resumed ? last_step(folder / "series.csv") : std::nullopt;
     children_.push_back(
-        {start(options_.program, words, options_.folder / "logs" / (name + ".txt")), k, attempt, Clock::now(), steal, folder / "series.csv",
+        {start(options_.program, words, options_.folder / "logs" / (name + ".txt")), k, attempt, resumed, static_cast<double>(steps_before.value_or(0)), Clock::now(), steal, folder / "series.csv",
          static_cast<double>(c.particles.table ? static_cast<std::int64_t>(c.particles.table->size()) : c.particles.count)});
     newest_ = title(k, attempt, " try ");
   }
@@ -279,6 +284,12 @@ class Runner {
     } else if (child.attempt > 0 && match_state(plan_, job, options_.folder).tries.size() >= child.attempt) {
       outcome.state = JobState::waiting;
       queue_.insert(queue_.begin(), child.job);  // the next try, or the run, before jobs that have not begun
+      return;
+    } else if (child.resumed && (exit_code == exit_io || exit_code == exit_case)) {
+      // Whatever keeps it from going on (other kernels, a damaged file): it can still be made anew.
+      from_the_start_.insert(child.job);
+      outcome.state = JobState::waiting;
+      queue_.insert(queue_.begin(), child.job);
       return;
     } else if (is_done(options_.folder, job)) {
       outcome.state = JobState::done;
@@ -338,7 +349,7 @@ class Runner {
       std::error_code none;  // a series from before this child is that of an earlier attempt
       const auto written = fs::last_write_time(child.series, none);
       if (none || written < child.born) continue;
-      if (const auto step = last_step(child.series)) child.particle_steps = child.spheres * *step;
+      if (const auto step = last_step(child.series)) child.particle_steps = child.spheres * *step, child.own_steps = child.spheres * std::max(0.0, static_cast<double>(*step) - child.steps_before);
     }
   }
 
@@ -354,10 +365,10 @@ class Runner {
     look_at_children();
     // Guesses are off alike: what the finished runs took instead of theirs holds for the others too.
     const double stretch = done_weight_ > 0.0 ? done_steps_ / done_weight_ : 1.0;
-    double under_way = 0.0, running_steps = 0.0, seconds = done_seconds_;
+    double under_way = 0.0, running_steps = 0.0, seconds = done_seconds_;  // steps that these seconds took
     for (const Child& child : children_) {
       if (child.attempt > 0) continue;
-      running_steps += child.particle_steps;
+      running_steps += child.own_steps;
       under_way += std::min(0.97 * plan_.jobs[child.job].weight, child.particle_steps / stretch);
       seconds += since(child.begin);
     }
@@ -373,6 +384,7 @@ class Runner {
   const RunnerOptions& options_;
   std::vector<JobOutcome> outcomes_;
   std::vector<Clock::time_point> look_at_;  // when a job that waits for its reference is looked at again
+  std::set<std::size_t> from_the_start_;    // jobs whose checkpoints were of no use
   std::vector<std::size_t> queue_;          // jobs of which nothing runs, to be gone on with in this order
   std::string newest_;
   std::vector<Child> children_;

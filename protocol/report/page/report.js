@@ -75,7 +75,7 @@
     ['height', (s) => (known(s.values.height) ? unit(1000 * s.values.height, 4, 'mm') : '–')],
     ['ledger open by', (s) => percent(known(s.energy_residual_share) ? Math.abs(s.energy_residual_share) : null, 2)],
     ['smallest dt', (s) => (s.time_step ? unit(1e6 * s.time_step.smallest, 3, 'µs') : '–')],
-    ['of dt_limit', (s) => (s.time_step ? figures(s.time_step.largest / s.time_step.smallest_dt_limit, 2) : '–')],
+    ['dt over dt_limit, at most', (s) => (s.time_step ? figures(s.time_step.largest_over_dt_limit, 2) : '–')],
     ['which contact rules', (s) => (s.time_step ? s.time_step.ruled_by || '–' : '–'), true],
   ];
   const body = make('tbody', {});
@@ -93,12 +93,13 @@
   const zoom = {
     id: 'zoom',
     afterInit(chart) {
-      const canvas = chart.canvas;
+      const canvas = chart.canvas, listening = new AbortController(), until = { signal: listening.signal };
+      chart.stop_listening = () => listening.abort();
       let from = null;
       const at = (event) => { const box = canvas.getBoundingClientRect(); return { x: event.clientX - box.left, y: event.clientY - box.top }; };
       const inside = (p) => { const a = chart.chartArea; return { x: Math.min(a.right, Math.max(a.left, p.x)), y: Math.min(a.bottom, Math.max(a.top, p.y)) }; };
-      canvas.addEventListener('mousedown', (e) => { from = inside(at(e)); });
-      canvas.addEventListener('mousemove', (e) => { if (from) { chart.frame = [from, inside(at(e))]; chart.draw(); } });
+      canvas.addEventListener('mousedown', (e) => { from = inside(at(e)); }, until);
+      canvas.addEventListener('mousemove', (e) => { if (from) { chart.frame = [from, inside(at(e))]; chart.draw(); } }, until);
       window.addEventListener('mouseup', (e) => {
         if (!from) return;
         const to = inside(at(e)), begin = from;
@@ -109,12 +110,13 @@
             chart.options.scales[axis].min = values[0], chart.options.scales[axis].max = values[1];
           }
         chart.update();
-      });
+      }, until);
       canvas.addEventListener('dblclick', () => {
         for (const axis of ['x', 'y']) delete chart.options.scales[axis].min, delete chart.options.scales[axis].max;
         chart.update();
-      });
+      }, until);
     },
+    afterDestroy(chart) { chart.stop_listening(); },
     afterDraw(chart) {
       if (!chart.frame) return;
       const [a, b] = chart.frame;
@@ -192,15 +194,15 @@
     ]));
   plot('porosity', 'Porosity', 'Between the plates, overlaps not subtracted; dashed: unloading.', 'stress (kPa)', 'porosity', branches(of('stress_top', 1e-3), of('porosity')));
   plot('coordination', 'Coordination number', 'Touching pairs of spheres, twice, over spheres; dashed: unloading.', 'stress (kPa)', 'coordination number', branches(of('stress_top', 1e-3), of('coordination_number')));
-  const profile_stage = (run) => last(stage_of_kind(run, 'compress').filter((s) => run.profiles[s.name])) || last(run.stages.filter((s) => run.profiles[s.name]));
-  plot('profile', 'Porosity over height', 'Slabs from plate to plate, at the end of loading (faint: before it).', 'porosity', 'height (mm)',
+  const profile_stage = (run) => last(stage_of_kind(run, 'compress').filter((s) => s.profile)) || last(run.stages.filter((s) => s.profile));
+  plot('profile', 'Porosity over height', 'Slabs from plate to plate, at the end of loading, else of the last stage that has a profile (faint: of the stage before).', 'porosity', 'height (mm)',
     runs.flatMap((run, k) => {
       const pressed = profile_stage(run);
       if (!pressed) return [];
       const before = run.stages[run.stages.indexOf(pressed) - 1];
-      const line = (s) => run.profiles[s.name].porosity.map((p, j) => [p, 1000 * run.profiles[s.name].z[j]]).filter((p) => known(p[0]));
+      const line = (s) => (s.profile.porosity || []).map((p, j) => [p, 1000 * s.profile.z[j]]).filter((p) => known(p[0]));
       return [{ label: named(run, several ? '' : pressed.name), colour: colour(k), points: line(pressed) }].concat(
-        before && run.profiles[before.name] ? [{ label: several ? '' : before.name, colour: colour(k) + '66', points: line(before) }] : []);
+        before && before.profile ? [{ label: several ? '' : before.name, colour: colour(k) + '66', points: line(before) }] : []);
     }));
   plot('time', 'Stress over time', 'Top plate; dotted: bottom plate. The whole run.', 'time (s)', 'stress (kPa)', runs.flatMap((run, k) => [
     { label: named(run, several ? '' : 'top'), colour: colour(k), points: rows(run, null, of('time'), of('stress_top', 1e-3)) },
@@ -222,7 +224,7 @@
       }) }], { into: 'one' });
     plot('step', 'Time step', 'The step taken, and what the network of contacts allows: dt_crit without dashpots, dt_limit with them.', 'time (s)', 'step (µs)',
       [['dt', 'dt', []], ['dt_limit', 'dt_limit', [6, 3]], ['dt_crit', 'dt_crit', [2, 3]]].map(([key, name, dash], k) => (
-        { label: name, colour: colour(k), dash, stepped: 'before', points: run.limits.map((l) => [l.time, 1e6 * l[key]]) })), { into: 'one' });
+        { label: name, colour: colour(k), dash, stepped: key === 'dt' ? 'before' : false, points: run.limits.filter((l) => known(l[key])).map((l) => [l.time, 1e6 * l[key]]) })), { into: 'one' });
     place('case').textContent = run.case;
     place('bed').hidden = !window.THREE || !run.beds.length;
     if (place('bed').hidden) return;
@@ -274,7 +276,7 @@
       if (!this.renderer) this.start();
       this.run = run;
       const metres = (list) => Float32Array.from(list, (v) => v * run.particles.unit);
-      this.beds = run.beds.map((b) => ({ stage: b.stage, x: metres(b.position), moved: b.moved ? metres(b.moved) : null }));
+      this.beds = run.beds.map((b) => ({ stage: b.stage, since: b.since, x: metres(b.position), moved: b.moved ? metres(b.moved) : null }));
       const n = run.particles.count, R = metres(run.particles.radius);
       this.R = (k) => (R.length === 1 ? R[0] : R[k]);
       if (this.mesh) this.scene.remove(this.mesh), this.mesh.geometry.dispose();
@@ -339,7 +341,7 @@
       place('bed-name').textContent = bed.stage;
       place('bed-bar').style.background = 'linear-gradient(90deg,' + ramp.map(css).join(',') + ')';
       place('bed-least').textContent = figures(1000 * least, 3), place('bed-most').textContent = figures(1000 * most, 3) + ' mm';
-      place('bed-what').textContent = how === 'moved' ? 'way since the stage before' : 'height before loading';
+      place('bed-what').textContent = how !== 'moved' ? 'height at the end of ' + level.stage : bed.since ? 'way since the end of ' + bed.since : 'way: nothing to compare with';
       this.draw();
     },
   };
