@@ -21,6 +21,7 @@
 #include "protocol/case_reader.h"
 #include "protocol/check_command.h"
 #include "protocol/experiment.h"
+#include "protocol/export_command.h"
 #include "protocol/info.h"
 #include "protocol/law_command.h"
 #include "protocol/output/output_error.h"
@@ -201,6 +202,16 @@ Command add_report(CLI::App& program) {
   return {app, "platen report runs/soft runs/stiff -o comparison.html", [=] { return report_command(*command); }};
 }
 
+Command add_export(CLI::App& program) {
+  CLI::App* app = program.add_subcommand("export", "write the spheres at the ends of stages in another format");
+  auto command = std::make_shared<ExportCommand>();
+  app->add_option("DIR", command->folder, "run folder")->type_name("DIR")->required();
+  app->add_option("--to", command->format, "format")->type_name("csv|vtu|lammps|h5md")->required()->check(CLI::IsMember({"csv", "vtu", "lammps", "h5md"}));
+  app->add_option("-o,--output", command->output, "folder of the files (default: DIR/export)")->type_name("DIR");
+  app->add_flag("-q,--quiet", command->quiet, "print nothing but errors");
+  return {app, "platen export runs/first --to csv", [=] { return export_command(*command); }};
+}
+
 Command add_info(CLI::App& program) {
   CLI::App* app = program.add_subcommand("info", "say what is in a run folder, an HDF5 file or a case file");
   auto path = std::make_shared<std::filesystem::path>();
@@ -226,7 +237,7 @@ int run_program(int argc, char** argv) {
   program.require_subcommand(1);
   program.footer("platen COMMAND --help explains a command.");
   const std::vector<Command> commands = {add_run(program), add_resume(program), add_check(program), add_law(program), add_study(program),
-                                         add_report(program), add_info(program)};
+                                         add_report(program), add_export(program), add_info(program)};
   for (const Command& command : commands) command.app->footer(std::string("Example:\n  ") + command.example);
 
   if (argc == 1) {

@@ -116,7 +116,7 @@ TEST(Program, MistakesAreNamedAndNothingIsWritten) {
   const auto before = folder.listing();
   const std::vector<Mistake> mistakes{
       {{"rum", "case.toml"}, 2, "did you mean run?"},
-      {{"fly", "case.toml"}, 2, "no command \"fly\"; allowed: run, resume, check, law, study, report, info"},
+      {{"fly", "case.toml"}, 2, "no command \"fly\"; allowed: run, resume, check, law, study, report, export, info"},
       {{"run", "case.toml", "--colour"}, 2, "--colour"},
       {{"run", "case.toml", "other.toml"}, 2, "other.toml"},
       {{"run", "case.toml", "--threads", "0"}, 2, "--threads"},

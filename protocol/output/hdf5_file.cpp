@@ -174,6 +174,15 @@ template void Hdf5Group::write(const std::string&, const std::vector<std::int32_
 template void Hdf5Group::write(const std::string&, const std::vector<std::uint8_t>&, int, const Hdf5Meaning&);
 
 template <class T>
+void Hdf5Group::write_shaped(const std::string& name, const std::vector<T>& values, const std::vector<std::uint64_t>& shape, const Hdf5Meaning& meaning) {
+  const std::vector<hsize_t> size(shape.begin(), shape.end());
+  const Hdf5Id space = checked(H5Screate_simple(static_cast<int>(size.size()), size.data(), nullptr), H5Sclose, name);
+  write_dataset(name, file_type<T>(), memory_type<T>(), space.get(), values.data(), meaning);
+}
+template void Hdf5Group::write_shaped(const std::string&, const std::vector<double>&, const std::vector<std::uint64_t>&, const Hdf5Meaning&);
+template void Hdf5Group::write_shaped(const std::string&, const std::vector<std::int32_t>&, const std::vector<std::uint64_t>&, const Hdf5Meaning&);
+
+template <class T>
 void Hdf5Group::write_codes(const std::string& name, const std::vector<T>& values, const Hdf5Codes& codes,
                             const Hdf5Meaning& meaning) {
   const Hdf5Id type = checked(H5Tenum_create(file_type<T>()), H5Tclose, name);
@@ -278,6 +287,16 @@ void Hdf5Group::attribute(const std::string& name, const std::vector<std::int64_
   check(H5Awrite(attribute.get(), H5T_NATIVE_INT64, values.data()), name);
 }
 
+void Hdf5Group::attribute(const std::string& name, const std::vector<std::string>& values) {
+  const Hdf5Id type = text_type();
+  const hsize_t size = values.size();
+  const Hdf5Id space = checked(H5Screate_simple(1, &size, nullptr), H5Sclose, name);
+  const Hdf5Id attribute = checked(H5Acreate2(id_.get(), name.c_str(), type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose, name);
+  std::vector<const char*> texts;
+  for (const std::string& value : values) texts.push_back(value.c_str());
+  check(H5Awrite(attribute.get(), type.get(), texts.data()), name);
+}
+
 void Hdf5Group::ascii_attribute(const std::string& name, const std::string& value) {
   const Hdf5Id type = checked(H5Tcopy(H5T_C_S1), H5Tclose, name);
   check(H5Tset_size(type.get(), value.size()), name);
@@ -323,6 +342,16 @@ std::int64_t Hdf5Group::integer_attribute(const std::string& object, const std::
       H5Aopen_by_name(id_.get(), object.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose, object);
   std::int64_t value = otherwise;
   check(H5Aread(attribute.get(), H5T_NATIVE_INT64, &value), object);
+  return value;
+}
+
+double Hdf5Group::real_attribute(const std::string& object, const std::string& name, double otherwise) const {
+  const htri_t there = H5Aexists_by_name(id_.get(), object.c_str(), name.c_str(), H5P_DEFAULT);
+  check(there, object);
+  if (there == 0) return otherwise;
+  const Hdf5Id attribute = checked(H5Aopen_by_name(id_.get(), object.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose, object);
+  double value = otherwise;
+  check(H5Aread(attribute.get(), H5T_NATIVE_DOUBLE, &value), object);
   return value;
 }
 

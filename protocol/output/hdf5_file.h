@@ -64,6 +64,9 @@ class Hdf5Group {
   // Values in rows of `columns` numbers: shape N (columns = 1) or N x columns. T: double, std::int64_t, std::int32_t, std::uint8_t.
   template <class T>
   void write(const std::string& name, const std::vector<T>& values, int columns, const Hdf5Meaning& meaning);
+  // Any shape, last index fastest. T: double, std::int32_t.
+  template <class T>
+  void write_shaped(const std::string& name, const std::vector<T>& values, const std::vector<std::uint64_t>& shape, const Hdf5Meaning& meaning);
   // An enumeration, shape N. T: std::int8_t or std::int32_t.
   template <class T>
   void write_codes(const std::string& name, const std::vector<T>& values, const Hdf5Codes& codes,
@@ -82,10 +85,12 @@ class Hdf5Group {
   void attribute(const std::string& name, std::uint64_t value);
   void attribute(const std::string& name, bool value);
   void attribute(const std::string& name, const std::vector<std::int64_t>& values);
+  void attribute(const std::string& name, const std::vector<std::string>& values);
   void ascii_attribute(const std::string& name, const std::string& value);  // of fixed length, for readers that want it so
   // A text attribute of the member `object` ("." = the group itself); empty when there is none.
   std::string text_attribute(const std::string& object, const std::string& name) const;
   std::int64_t integer_attribute(const std::string& object, const std::string& name, std::int64_t otherwise) const;
+  double real_attribute(const std::string& object, const std::string& name, double otherwise) const;
 
   void copy_from(const Hdf5Group& source, const std::string& name);  // a whole member with all below it
   void link(const Hdf5Group& target, const std::string& name);       // a second name for `target`
