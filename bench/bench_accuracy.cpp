@@ -213,7 +213,7 @@ int main(int argc, char** argv) {
       std::set<std::string> known;
       for (const Setting& v : settings)
         if ((v.part == "step" || v.part == "auto") && known.insert(v.name).second) steps.push_back(&v);
-      report += "### Trend over the step\n\nLeast squares through all these runs, a level for each seed and one slope: the change between this step and none, ± standard error. Bounds as above, in the order of the columns.\n\n" +
+      report += "### Trend over the step\n\nLeast squares through all these runs, a level for each seed and one slope: the change between this step and none, ± standard error. Bounds as above, in the order of the columns, but over the scatter between seeds of all these settings.\n\n" +
                 trend_table(steps, figures, crush, over_steps(figures, dt_crit)) + "\n";
     }
     part("speed", fmt::format("The bed over the speed of the plates, safety {:g}", size.safety), "plate speed (mm/s)", true, [](const Setting& v) { return fmt::format("{:g}", 1e3 * v.value); });
@@ -221,7 +221,7 @@ int main(int argc, char** argv) {
       std::vector<const Setting*> speeds;
       for (const Setting& v : settings)
         if (v.part == "speed") speeds.push_back(&v);
-      report += "### Trend over the speed\n\nThe same over the speed of the plates: the change between this speed and none.\n\n" + trend_table(speeds, figures, crush, over_speeds(figures)) + "\n";
+      report += "### Trend over the speed\n\nThe same over the speed of the plates: the change between this speed and none. A line is assumed: bounds of slow plates are fractions of those of the fastest.\n\n" + trend_table(speeds, figures, crush, over_speeds(figures)) + "\n";
     }
     part("same", "What must not matter", "setting", true, [](const Setting& v) { return v.reproducible ? std::string("--reproducible") : v.skin > 0 ? fmt::format("skin {:g} R", v.value) : std::string("default"); });
     part("scale", "The bed over the size of the spheres, stiffness ~ R, f0 ~ R^2", "R (mm)", false, [](const Setting& v) { return fmt::format("{:g}", 1e3 * v.value); });

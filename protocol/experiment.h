@@ -81,7 +81,8 @@ RunOutcome run_experiment(const Case& c, RunFolder& folder, const RunOptions& op
 
 // What a checkpoint counted on. Throws OutputError.
 struct CheckpointFacts {
-  std::size_t rows = 0, frames = 0;    // of series.csv, frames.hdf.series
+  std::size_t rows = 0;                // of series.csv
+  std::vector<double> frames;          // their times [s]
   std::size_t stage = 0;               // to go on with, from 0
   std::vector<StageResult> closed;
 };

@@ -36,7 +36,7 @@ void Experiment::keep(nlohmann::json stage) {
   nlohmann::json experiment = nlohmann::json::object();
   fields::Writer writer{experiment};
   each_field(writer);
-  experiment["rows"] = folder_.rows(), experiment["frames"] = folder_.frames();
+  experiment["rows"] = folder_.rows(), experiment["frames"] = fields::to_json(folder_.frame_times());
   experiment["stage"] = std::move(stage);
   Checkpoint checkpoint;
   checkpoint.bed = sim_->whole_state();
@@ -98,7 +98,8 @@ Experiment::Course Experiment::go_on_with_stage(Stand& stand, Stage& stage) {
 CheckpointFacts facts_of(const Checkpoint& checkpoint) try {
   const nlohmann::json experiment = nlohmann::json::parse(checkpoint.experiment);
   CheckpointFacts facts;
-  facts.rows = experiment.at("rows").get<std::size_t>(), facts.frames = experiment.at("frames").get<std::size_t>();
+  facts.rows = experiment.at("rows").get<std::size_t>();
+  fields::from_json(experiment.at("frames"), facts.frames);
   facts.stage = experiment.at("stage").at("index").get<std::size_t>();
   fields::from_json(experiment.at("closed"), facts.closed);
   return facts;

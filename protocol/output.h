@@ -70,15 +70,15 @@ class RunFolder {
   static RunFolder create(const std::filesystem::path& folder, const std::string& case_text, bool force);
 
   // Takes up the folder of an interrupted run: keeps the first `rows` rows of series.csv (empty: all whole rows), the stages
-  // closed so far and the first `frames` frames, all as noted by the checkpoint.
+  // closed so far and the frames of these times, all as noted by the checkpoint.
   static RunFolder reopen(const std::filesystem::path& folder, std::optional<std::size_t> rows,
-                          std::vector<StageResult> closed, std::size_t frames = 0) {
+                          std::vector<StageResult> closed, const std::vector<double>& frames = {}) {
     return reopen(hold(folder), folder, rows, std::move(closed), frames);
   }
   // The same with the lock in hand, for those who must look at the folder before.
   static UniqueFd hold(const std::filesystem::path& folder);
   static RunFolder reopen(UniqueFd held, const std::filesystem::path& folder, std::optional<std::size_t> rows,
-                          std::vector<StageResult> closed, std::size_t frames, const std::string& start_time = {});
+                          std::vector<StageResult> closed, const std::vector<double>& frames, const std::string& start_time = {});
 
   // Whether a process works in the folder at this moment.
   static bool in_use(const std::filesystem::path& folder);
@@ -94,7 +94,7 @@ class RunFolder {
 
   // One more frame: frames/NUMBER.hdf, and frames.hdf.series with it.
   void add_frame(const Snapshot& snapshot, double width, double depth);
-  std::size_t frames() const { return frames_.size(); }
+  std::vector<double> frame_times() const;  // [s]
 
   // Rewrites results.h5 with this stage added. `snapshot` and `profile` are those of the stage's end.
   void close_stage(const StageResult& stage, const Snapshot& snapshot, const Profile& profile);

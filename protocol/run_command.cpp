@@ -165,7 +165,7 @@ int resume_command(const ResumeCommand& command) {
   std::string passed_over;
   const Checkpoint from = newest_checkpoint(path, passed_over);
   if (c.text != from.case_text)
-    throw CaseError(fmt::format("{}: is not the case that the run was begun with; put that back (it is in results.h5, /case), or begin anew with `platen run`", (path / "case.toml").string()));
+    throw CaseError(fmt::format("{}: is not the case that the run was begun with; put that back (dataset /case of the checkpoint has it), or begin anew with `platen run`", (path / "case.toml").string()));
   const CheckpointFacts facts = facts_of(from);
   RunOptions options;
   options.threads = command.threads.value_or(usable_cores());

@@ -15,7 +15,7 @@ potential_energy kinetic_to_potential inertial_number energy_residual elastic_en
 plate_energy plastic_dissipation viscous_dissipation sliding_dissipation rolling_dissipation plate_model_work plate_work
 inserted_energy removed_energy""".split()
 PARTICLES = {"id": (1, "i8"), "position": (3, "f8"), "image": (2, "i4"), "velocity": (3, "f8"),
-             "angular_velocity": (3, "f8"), "radius": (1, "f8")}
+             "angular_velocity": (3, "f8"), "radius": (1, "f8"), "mass": (1, "f8")}
 CONTACTS = {"pair": (2, "i8"), "image": (2, "i4"), "overlap": (1, "f8"), "plastic_overlap": (1, "f8"),
             "normal_force": (1, "f8"), "damping_force": (1, "f8"), "tangential_force": (3, "f8"), "branch": (1, "i1")}
 PLATE_CONTACTS = {"id": (1, "i8"), "plate": (1, "i1"), "overlap": (1, "f8"), "force": (3, "f8")}

@@ -26,6 +26,20 @@ TEST(Export, OtherReadersFindTheSameNumbers) {
   write_file(root / "out/again.toml", table_case(time_passes("10 us"), "[box]\nwidth = \"20 mm\"\ndepth = \"20 mm\"\nheight = \"80 mm\"\n"));
   result = run_program({"run", (root / "out/again.toml").string(), "-o", (root / "again").string(), "-q", "--no-report", "--set", "particles.file=\"2-settle.csv\"", "--set", "environment.gravity=9.81"});
   ASSERT_EQ(result.exit_code, 0) << result.report();
+  const CsvTable settled = read_csv(root / "out/2-settle.csv");
+  const Dataset<double> first = ResultsFile(root / "again/results.h5").doubles("/stages/run/particles/position");
+  for (std::size_t k = 0; k < settled.rows.size(); ++k) {
+    EXPECT_EQ(settled.number(k, "density"), 2000.0);
+    for (std::size_t axis = 0; axis < 3; ++axis)  // one step later
+      EXPECT_NEAR(first.at(k, axis), settled.number(k, axis == 0 ? "x" : axis == 1 ? "y" : "z") + 1e-5 * settled.number(k, axis == 0 ? "vx" : axis == 1 ? "vy" : "vz"), 1e-6);
+  }
+  // A former run's files do not outlive it; what is not platen's does.
+  ASSERT_EQ(run_program({"export", run, "--to", "csv", "-q"}).exit_code, 0);
+  write_file(root / "run/export/notes.txt", "mine");
+  ASSERT_EQ(run_program({"run", (root / "case.toml").string(), "-o", run + "2", "-q", "--no-report"}).exit_code, 0);
+  fs::copy(root / "run/export", root / "run2/export");
+  ASSERT_EQ(run_program({"run", (root / "case.toml").string(), "-o", run + "2", "-q", "--no-report", "--force", "--stop-after", "fill"}).exit_code, 0);
+  EXPECT_EQ(std::distance(fs::directory_iterator(root / "run2/export"), fs::directory_iterator{}), 1);
   // The script notices a difference.
   fs::copy_file(root / "out/2-settle.vtu", root / "out/3-compress.vtu", fs::copy_options::overwrite_existing);
   EXPECT_NE(std::system((check + " 2>/dev/null").c_str()), 0);

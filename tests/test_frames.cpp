@@ -1,6 +1,8 @@
 // Frames for ParaView: what VTK's own reader finds in them is the bed at that time; they change nothing and survive an interruption.
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
 #include "tests/experiment_case.h"
 
 namespace platen::test {
@@ -25,6 +27,14 @@ TEST(Frames, VtkReadsTheBed) {
   // In one stage alone, and a run that was stopped and goes on: the same files, byte by byte.
   result = run_program({"run", file, "-o", (root / "one").string(), "-q", "--no-report", "--set", "output.frames=\"off\"", "--set", "stage.compress.frames=\"10 ms\""});
   ASSERT_EQ(result.exit_code, 0) << result.report();
+  const CsvTable series = read_csv(root / "one/series.csv");
+  double begin = 1e9, end = 0.0;
+  for (std::size_t k = 0; k < series.rows.size(); ++k)
+    if (series.cell(k, "stage") == "compress") begin = std::min(begin, series.number(k, "time")), end = std::max(end, series.number(k, "time"));
+  const auto frames = nlohmann::json::parse(read_file(root / "one/frames.hdf.series")).at("files");
+  EXPECT_EQ(frames.front().at("time"), begin);
+  EXPECT_EQ(frames.back().at("time"), end);
+  EXPECT_GT(frames.size(), 3u);
   result = run_program({"run", file, "-o", (root / "broken").string(), "-q", "--no-report", "--max-walltime", "0.15 s"});
   ASSERT_EQ(result.exit_code, 75) << result.report();
   result = run_program({"resume", (root / "broken").string(), "-q", "--no-report"});

@@ -71,6 +71,13 @@ void expect_same_run(const fs::path& whole, const fs::path& broken) {
   EXPECT_EQ(facts(whole), facts(broken));
   const Hdf5File a = Hdf5File::open(whole / "results.h5"), b = Hdf5File::open(broken / "results.h5");
   expect_same_group(a.root(), b.root(), "/");
+  ASSERT_EQ(fs::exists(whole / "frames.hdf.series"), fs::exists(broken / "frames.hdf.series"));
+  if (!fs::exists(whole / "frames.hdf.series")) return;
+  EXPECT_EQ(read_file(whole / "frames.hdf.series"), read_file(broken / "frames.hdf.series"));
+  const auto count = [](const fs::path& folder) { return std::distance(fs::directory_iterator(folder), fs::directory_iterator{}); };
+  EXPECT_EQ(count(whole / "frames"), count(broken / "frames"));
+  for (const auto& entry : fs::directory_iterator(whole / "frames"))
+    EXPECT_EQ(read_file(entry.path()), read_file(broken / "frames" / entry.path().filename())) << entry.path();
 }
 
 // Stopped, killed, or told to keep a checkpoint and killed, at random, on one thread and on two, until it is done.
@@ -119,7 +126,7 @@ struct ResumeCase {
 void PrintTo(const ResumeCase& c, std::ostream* out) { *out << c.name; }
 
 // The whole protocol, automatic step.
-const std::string every_stage = replaced("step = \"10 us\"", "step = \"auto\"", small_bed) + fill + "[[stage]]\nkind = \"vibrate\"\nfrequency = 60.0\namplitude = 1e-3\nduration = 0.1\n" + quick_settle + press +
+const std::string every_stage = replaced("step = \"10 us\"", "step = \"auto\"", small_bed) + "frames = \"10 ms\"\n" + fill + "[[stage]]\nkind = \"vibrate\"\nfrequency = 60.0\namplitude = 1e-3\nduration = 0.1\n" + quick_settle + press +
                                 "[[stage]]\nkind = \"hold\"\nstress = \"20 kPa\"\nduration = \"80 ms\"\n" + unload +
                                 "[[stage]]\nkind = \"release\"\nuntil = { kinetic_to_potential = 1e-4, window = \"20 ms\" }\n"
                                 "[[stage]]\nkind = \"crush\"\nspeed = \"50 mm/s\"\nstart_gap = \"0.1 mm\"\nuntil = { strain = 0.1, drop = 0.2 }\n";
@@ -271,6 +278,29 @@ TEST(ResumeCommand, FromTheLastStepOfAStage) {
     ASSERT_TRUE(code == 75 || code == 0) << code;
   }
   EXPECT_GE(stops, 3);
+  expect_same_run(root / "whole", run);
+}
+
+// A checkpoint, more frames, kill -9: frames behind the checkpoint are gone until the run comes by there again, also where the
+// list is lost.
+TEST(ResumeCommand, FramesBehindTheCheckpoint) {
+  TemporaryFolder root;
+  write_file(root / "case.toml", small_bed + "frames = \"5 ms\"\n" + fill + quick_settle + press);
+  const std::string file = (root / "case.toml").string();
+  const fs::path run = root / "run";
+  ASSERT_EQ(run_program({"run", file, "-o", (root / "whole").string(), "-q", "--no-report"}).exit_code, 0);
+  ASSERT_EQ(run_program({"run", file, "-o", run.string(), "-q", "--no-report", "--stop-after", "fill"}).exit_code, 0);
+  fs::copy_file(run / "checkpoint.h5", root / "kept.h5");
+  ASSERT_EQ(run_program({"resume", run.string(), "-q", "--no-report", "--stop-after", "settle"}).exit_code, 0);
+  const auto listed = [&] { return Json::parse(read_file(run / "frames.hdf.series")).at("files").size(); };
+  const std::size_t later = listed();
+  fs::copy_file(root / "kept.h5", run / "checkpoint.h5", fs::copy_options::overwrite_existing);
+  fs::remove(run / "checkpoint.prev.h5");
+  fs::remove(run / "frames.hdf.series");
+  ASSERT_EQ(run_program({"resume", run.string(), "-q", "--no-report", "--max-walltime", "1e-9"}).exit_code, 75);
+  EXPECT_LT(listed(), later);
+  EXPECT_EQ(listed(), static_cast<std::size_t>(std::distance(fs::directory_iterator(run / "frames"), fs::directory_iterator{})));
+  ASSERT_EQ(run_program({"resume", run.string(), "-q", "--no-report"}).exit_code, 0);
   expect_same_run(root / "whole", run);
 }
 

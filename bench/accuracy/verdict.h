@@ -83,6 +83,11 @@ inline std::vector<Verdict> judge(const std::vector<const Setting*>& settings, c
 inline double work_of(const Figures& figures, const Setting& v) { return moments(column(figures, v.name, "work")).mean; }
 inline Moments seconds_of(const Figures& figures, const Setting& v) { return moments(column(figures, v.name, "seconds")); }
 
+// The same of the reference over the seeds that a row has.
+inline double reference_work(const Figures& figures, const Setting& reference, const Setting& row) {
+  return moments(column(figures, reference.name, "work", figures.at(row.name).size())).mean;
+}
+
 // The part's table; `value` prints what varies.
 template <class Value>
 std::string verdict_table(const std::string& head, const std::vector<Verdict>& verdicts, const Setting& reference, const Figures& figures, const Value& value) {
@@ -102,8 +107,10 @@ std::string verdict_table(const std::string& head, const std::vector<Verdict>& v
       worst = std::max(worst, r.bound() / r.scatter);
       complete = complete && r.complete;
     }
-    lines += fmt::format(" {} | {:.1e} | {:.3f} | {:.1f} | {} |\n", &v == &reference ? "" : complete ? fmt::format("{:.2f}", worst) : "", moments(column(figures, v.name, "energy")).mean,
-                         work_of(figures, v), seconds_of(figures, v).mean,
+    const std::size_t seeds = figures.at(v.name).size();
+    const std::string few = seeds < figures.at(reference.name).size() ? fmt::format(" (reference, the same {} seeds: {:.3f})", seeds, reference_work(figures, reference, v)) : "";
+    lines += fmt::format(" {} | {:.1e} | {:.3f}{} | {:.1f} | {} |\n", &v == &reference ? "" : complete ? fmt::format("{:.2f}", worst) : "", moments(column(figures, v.name, "energy")).mean,
+                         work_of(figures, v), few, seconds_of(figures, v).mean,
                          &v == &reference ? "reference" : !complete ? "runs failed" : worst < 0.2 ? "a fifth" : worst < 0.5 ? "half" : worst < 1.0 ? "the scatter" : "no");
   }
   return lines;

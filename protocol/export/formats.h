@@ -15,7 +15,7 @@ std::vector<std::string> export_csv(const RunStates& run, const std::filesystem:
 // NUMBER-STAGE.vtu: VTK's XML, and stages.pvd with their times.
 std::vector<std::string> export_vtu(const RunStates& run, const std::filesystem::path& folder);
 // stages.dump: a text dump of all stages, for LAMMPS' own tools and OVITO; last.data: the last stage for read_data with atom_style
-// sphere, where the case gives one density.
+// sphere.
 std::vector<std::string> export_lammps(const RunStates& run, const std::filesystem::path& folder);
 // stages.h5md: H5MD 1.1, a frame a stage.
 std::vector<std::string> export_h5md(const RunStates& run, const std::filesystem::path& folder);

@@ -9,11 +9,17 @@ std::vector<std::string> export_h5md(const RunStates& run, const std::filesystem
   std::vector<std::int64_t> steps;
   std::vector<double> times, edges, position, velocity, spin;
   std::vector<std::int32_t> image;
+  // Boundaries hold for the whole file. Where sides opened on the way there are none, and spheres stand where their ways led them.
+  bool periodic = run.periodic;
+  for (const StageState& s : run.stages) periodic = periodic && !s.sides_open;
   for (const StageState& s : run.stages) {
     steps.push_back(s.step), times.push_back(s.time);
     edges.insert(edges.end(), {run.width, run.depth, s.z_top - s.z_bottom});
     const ParticleFields& p = s.particles;
-    position.insert(position.end(), p.position.begin(), p.position.end());
+    for (std::size_t k = 0; k < n; ++k) {
+      const double boxes[2] = {periodic ? 0.0 : p.image[2 * k] * run.width, periodic ? 0.0 : p.image[2 * k + 1] * run.depth};
+      position.insert(position.end(), {p.position[3 * k] + boxes[0], p.position[3 * k + 1] + boxes[1], p.position[3 * k + 2]});
+    }
     velocity.insert(velocity.end(), p.velocity.begin(), p.velocity.end());
     spin.insert(spin.end(), p.angular_velocity.begin(), p.angular_velocity.end());
     for (std::size_t k = 0; k < n; ++k) image.insert(image.end(), {p.image[2 * k], p.image[2 * k + 1], 0});
@@ -35,11 +41,10 @@ std::vector<std::string> export_h5md(const RunStates& run, const std::filesystem
     };
     Hdf5Group box = all.create_group("box");
     box.attribute("dimension", std::int64_t{3});
-    const bool periodic = run.periodic && !run.stages.front().sides_open;
     box.attribute("boundary", std::vector<std::string>{periodic ? "periodic" : "none", periodic ? "periodic" : "none", "none"});
     over_time(box, "edges", edges, {frames, 3}, {"m", "lengths of the box"});
-    over_time(all, "position", position, {frames, n, 3}, {"m", "centres, wrapped into the box"});
-    over_time(all, "image", image, {frames, n, 3}, {"-", "box lengths left behind"});
+    over_time(all, "position", position, {frames, n, 3}, {"m", periodic ? "centres, wrapped into the box" : "centres"});
+    if (periodic) over_time(all, "image", image, {frames, n, 3}, {"-", "box lengths left behind"});
     over_time(all, "velocity", velocity, {frames, n, 3}, {"m/s", "velocity"});
     over_time(all, "angular_velocity", spin, {frames, n, 3}, {"rad/s", "angular velocity"});
     all.write("id", run.stages.front().particles.id, 1, {"-", "particle number"});

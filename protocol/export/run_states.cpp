@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/particles.h"
 #include "protocol/case_file.h"
 #include "protocol/output/hdf5_file.h"
 #include "protocol/output/results_h5.h"
@@ -17,7 +18,6 @@ RunStates run_states(const fs::path& folder) {
   RunStates run;
   run.title = c.title;
   run.width = c.box.width, run.depth = c.box.depth, run.periodic = c.box.sides == Sides::periodic;
-  if (c.particles.file.empty()) run.density = c.particles.density;
   const Hdf5File file = Hdf5File::open(folder / "results.h5");
   const Hdf5Group root = file.root(), stages = root.group("stages");
   bool open = false;
@@ -35,6 +35,12 @@ RunStates run_states(const fs::path& folder) {
     s.particles.position = particles.read<double>("position"), s.particles.image = particles.read<std::int32_t>("image");
     s.particles.velocity = particles.read<double>("velocity"), s.particles.angular_velocity = particles.read<double>("angular_velocity");
     s.particles.radius = particles.read<double>("radius");
+    if (c.particles.file.empty()) {
+      s.density.assign(s.particles.size(), c.particles.density);
+    } else if (particles.has("mass")) {
+      s.particles.mass = particles.read<double>("mass");
+      for (std::size_t k = 0; k < s.particles.size(); ++k) s.density.push_back(s.particles.mass[k] / sphere_mass(s.particles.radius[k], 1.0));
+    }
     run.stages.push_back(std::move(s));
   }
   if (run.stages.empty()) throw OutputError(folder.string() + ": no stage has ended");

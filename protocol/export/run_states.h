@@ -16,14 +16,14 @@ struct StageState {
   double time = 0.0;            // [s]
   double z_bottom = 0.0, z_top = 0.0;  // [m]
   bool sides_open = false;      // after `release`
-  ParticleFields particles;     // masses are not known
+  ParticleFields particles;
+  std::vector<double> density;  // of each sphere [kg/m3]; empty where it is not known: unequal ones in files of older versions
 };
 
 struct RunStates {
   std::string title;
   double width = 0.0, depth = 0.0;  // of the box [m]; 0 where there is none
   bool periodic = false;
-  double density = 0.0;         // [kg/m3]; 0 where a particle file gave it
   std::vector<StageState> stages;   // at least one, in the order of the run
   ContactFields contacts;       // at the end of the last stage; empty with output.contacts = false
 };

@@ -35,11 +35,13 @@ std::vector<std::string> export_csv(const RunStates& run, const fs::path& folder
   for (std::size_t s = 0; s < run.stages.size(); ++s) {
     const ParticleFields& p = run.stages[s].particles;
     Text text;
-    add(text, "id,x,y,z,radius,vx,vy,vz,wx,wy,wz\n");
+    const std::vector<double>& density = run.stages[s].density;
+    add(text, "id,x,y,z,radius{},vx,vy,vz,wx,wy,wz\n", density.empty() ? "" : ",density");
     for (std::size_t k = 0; k < p.size(); ++k) {
       add(text, "{}", p.id[k]);
       for (std::size_t axis = 0; axis < 3; ++axis) add(text, ",{:.17g}", p.position[3 * k + axis]);
       add(text, ",{:.17g}", p.radius[k]);
+      if (!density.empty()) add(text, ",{:.17g}", density[k]);
       for (std::size_t axis = 0; axis < 3; ++axis) add(text, ",{:.17g}", p.velocity[3 * k + axis]);
       for (std::size_t axis = 0; axis < 3; ++axis) add(text, ",{:.17g}", p.angular_velocity[3 * k + axis]);
       add(text, "\n");
@@ -48,6 +50,7 @@ std::vector<std::string> export_csv(const RunStates& run, const fs::path& folder
     write(folder / names.back(), text);
   }
   const ContactFields& c = run.contacts;
+  fs::remove(folder / "contacts.csv");  // of an older export
   if (c.size() == 0) return names;
   Text text;
   add(text, "id_1,id_2,image_x,image_y,overlap,plastic_overlap,normal_force,damping_force,tangential_x,tangential_y,tangential_z,branch\n");
@@ -121,7 +124,7 @@ std::vector<std::string> export_lammps(const RunStates& run, const fs::path& fol
     add(text, "ITEM: ATOMS id type x y z ix iy radius vx vy vz omegax omegay omegaz\n");
     const ParticleFields& p = s.particles;
     for (std::size_t k = 0; k < p.size(); ++k) {
-      add(text, "{} 1 {:.17g} {:.17g} {:.17g} {} {} {:.17g}", p.id[k] + 1, p.position[3 * k], p.position[3 * k + 1], p.position[3 * k + 2], p.image[2 * k], p.image[2 * k + 1], p.radius[k]);
+      add(text, "{} 1 {:.17g} {:.17g} {:.17g} {} {} {:.17g}", p.id[k] + 1, p.position[3 * k], p.position[3 * k + 1], p.position[3 * k + 2], s.sides_open ? 0 : p.image[2 * k], s.sides_open ? 0 : p.image[2 * k + 1], p.radius[k]);
       for (const auto* column : {&p.velocity, &p.angular_velocity})
         for (std::size_t axis = 0; axis < 3; ++axis) add(text, " {:.17g}", (*column)[3 * k + axis]);
       add(text, "\n");
@@ -129,8 +132,9 @@ std::vector<std::string> export_lammps(const RunStates& run, const fs::path& fol
   }
   std::vector<std::string> names = {"stages.dump"};
   write(folder / names.back(), text);
-  if (!(run.density > 0.0)) return names;
+  fs::remove(folder / "last.data");  // of an older export
   const StageState& s = run.stages.back();
+  if (s.density.empty()) return names;
   const ParticleFields& p = s.particles;
   Span span[3];
   box(s, span);
@@ -139,7 +143,7 @@ std::vector<std::string> export_lammps(const RunStates& run, const fs::path& fol
   for (std::size_t axis = 0; axis < 3; ++axis) add(data, "{:.17g} {:.17g} {}lo {}hi\n", span[axis].low, span[axis].high, axes[axis], axes[axis]);
   add(data, "\nAtoms # sphere\n\n");
   for (std::size_t k = 0; k < p.size(); ++k)
-    add(data, "{} 1 {:.17g} {:.17g} {:.17g} {:.17g} {:.17g}\n", p.id[k] + 1, 2.0 * p.radius[k], run.density, p.position[3 * k], p.position[3 * k + 1], p.position[3 * k + 2]);
+    add(data, "{} 1 {:.17g} {:.17g} {:.17g} {:.17g} {:.17g}\n", p.id[k] + 1, 2.0 * p.radius[k], s.density[k], p.position[3 * k], p.position[3 * k + 1], p.position[3 * k + 2]);
   add(data, "\nVelocities\n\n");
   for (std::size_t k = 0; k < p.size(); ++k) {
     add(data, "{}", p.id[k] + 1);

@@ -88,16 +88,4 @@ void write_frame_series(const fs::path& path, const std::vector<Frame>& frames) 
   write_whole_file(path, Json{{"file-series-version", "1.0"}, {"files", list}}.dump(1) + "\n");
 }
 
-std::vector<Frame> read_frame_series(const fs::path& path) {
-  std::vector<Frame> frames;
-  if (!fs::exists(path)) return frames;
-  try {
-    const Json whole = Json::parse(read_whole_file(path));
-    for (const Json& frame : whole.at("files")) frames.push_back({frame.at("name"), frame.at("time")});
-  } catch (const Json::exception& error) {
-    throw OutputError(path.string() + ": " + error.what());
-  }
-  return frames;
-}
-
 }  // namespace platen

@@ -27,6 +27,5 @@ void write_frame(const std::filesystem::path& path, const Snapshot& snapshot, bo
 
 // frames.hdf.series, whole. Throws OutputError.
 void write_frame_series(const std::filesystem::path& path, const std::vector<Frame>& frames);
-std::vector<Frame> read_frame_series(const std::filesystem::path& path);
 
 }  // namespace platen

@@ -59,6 +59,7 @@ void write_particles(Hdf5Group group, const ParticleFields& p) {
   group.write("velocity", p.velocity, 3, {"m/s", "velocity x, y, z at full time"});
   group.write("angular_velocity", p.angular_velocity, 3, {"rad/s", "angular velocity x, y, z at full time"});
   group.write("radius", p.radius, 1, {"m", "radius"});
+  group.write("mass", p.mass, 1, {"kg", "mass"});
 }
 
 void write_contacts(Hdf5Group group, const ContactFields& c) {

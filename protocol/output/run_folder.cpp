@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <cctype>
 #include <cerrno>
 #include <chrono>
 #include <cstdio>
@@ -97,12 +98,26 @@ void remove_file(const fs::path& file) {
   fs::remove(file);
 }
 
+// What `platen export` writes there, and the folder where nothing else is in it.
+void remove_exports(const fs::path& folder) {
+  if (!fs::is_directory(fs::symlink_status(folder))) return;
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string(), end = entry.path().extension().string();
+    const bool of_stage = std::isdigit(static_cast<unsigned char>(name.front())) && name.find('-') != std::string::npos && (end == ".csv" || end == ".vtu");
+    if (of_stage || name == "contacts.csv" || name == "stages.pvd" || name == "stages.dump" || name == "last.data" || name == "stages.h5md") files.push_back(entry.path());
+  }
+  for (const fs::path& file : files) fs::remove(file);
+  if (fs::is_empty(folder)) fs::remove(folder);
+}
+
 // Removes what a former run left. Where no run was, only files go whose names this run needs.
 void remove_own_files(const fs::path& folder, bool former_run) {
   for (const char* name : main_files) remove_file(folder / name);
   remove_checkpoints(folder);  // always: `resume` must not take those of a former run for its own
   if (!former_run) return;
   for (const char* name : other_files) remove_file(folder / name);
+  remove_exports(folder / "export");
   const fs::path frames = folder / "frames";
   if (!fs::is_directory(fs::symlink_status(frames))) return;
   std::vector<fs::path> files;
@@ -112,6 +127,13 @@ void remove_own_files(const fs::path& folder, bool former_run) {
   }
   for (const fs::path& file : files) fs::remove(file);
   if (fs::is_empty(frames)) fs::remove(frames);
+}
+
+// Relative to the folder.
+std::string frame_name(std::size_t index) {
+  std::string number = std::to_string(index);
+  number.insert(0, number.size() < 6 ? 6 - number.size() : 0, '0');
+  return "frames/" + number + ".hdf";
 }
 
 const char* to_text(LogLevel level) {
@@ -160,7 +182,7 @@ UniqueFd RunFolder::hold(const fs::path& folder) {
 }
 
 RunFolder RunFolder::reopen(UniqueFd held, const fs::path& folder, std::optional<std::size_t> rows,
-                            std::vector<StageResult> closed, std::size_t frames, const std::string& start_time) try {
+                            std::vector<StageResult> closed, const std::vector<double>& frames, const std::string& start_time) try {
   std::string case_text = read_whole_file(folder / "case.toml");
   SeriesFile series = SeriesFile::reopen(folder / "series.csv", rows);
   // A torn last line of the log goes too.
@@ -169,9 +191,11 @@ RunFolder RunFolder::reopen(UniqueFd held, const fs::path& folder, std::optional
   AppendFile log = AppendFile::reopen(log_path, old_log.rfind('\n') == std::string::npos ? 0 : old_log.rfind('\n') + 1);
   RunFolder run(folder, std::move(held), std::move(case_text), std::move(series), std::move(log));
   run.closed_ = std::move(closed);
-  if (frames > 0) run.frames_ = read_frame_series(folder / "frames.hdf.series");
-  if (run.frames_.size() < frames) throw OutputError((folder / "frames.hdf.series").string() + ": has fewer frames than the checkpoint counted");
-  run.frames_.resize(frames);
+  // Frames behind the checkpoint go, as rows do.
+  for (const double time : frames) run.frames_.push_back({frame_name(run.frames_.size()), time});
+  for (std::size_t k = frames.size(); fs::exists(folder / frame_name(k)); ++k) fs::remove(folder / frame_name(k));
+  if (!frames.empty()) write_frame_series(folder / "frames.hdf.series", run.frames_);
+  else fs::remove(folder / "frames.hdf.series");
   if (const std::string start = start_time.empty() ? start_time_of(folder / "results.h5") : start_time; !start.empty()) run.start_time_ = start;
   // Until this run finishes, the summary of an earlier end is not true any more.
   fs::remove(folder / "summary.json");
@@ -192,13 +216,17 @@ void RunFolder::close_stage(const StageResult& stage, const Snapshot& snapshot, 
 }
 
 void RunFolder::add_frame(const Snapshot& snapshot, double width, double depth) {
-  std::string number = std::to_string(frames_.size());
-  number.insert(0, number.size() < 6 ? 6 - number.size() : 0, '0');
-  const Frame frame{"frames/" + number + ".hdf", snapshot.time};
+  const Frame frame{frame_name(frames_.size()), snapshot.time};
   fs::create_directories(path_ / "frames");
   write_frame(path_ / frame.name, snapshot, info_.contacts, width, depth);
   frames_.push_back(frame);
   write_frame_series(path_ / "frames.hdf.series", frames_);
+}
+
+std::vector<double> RunFolder::frame_times() const {
+  std::vector<double> times;
+  for (const Frame& frame : frames_) times.push_back(frame.time);
+  return times;
 }
 
 void RunFolder::finish(int exit_code, std::optional<std::uint64_t> state_hash, const Performance& performance,

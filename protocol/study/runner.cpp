@@ -15,13 +15,14 @@
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <sstream>
 #include <thread>
 
 #include "protocol/experiment.h"
 #include "protocol/output/checkpoint_file.h"
 #include "protocol/output/files.h"
+#include "protocol/output/hdf5_file.h"
+#include "protocol/output/series_csv.h"
 #include "protocol/study/porosity_match.h"
 #include "protocol/study/settled_sample.h"
 
@@ -33,13 +34,19 @@ using Clock = std::chrono::steady_clock;
 
 double since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
-// Whether an interrupted run of this very case has left a checkpoint.
+// Whether an interrupted run of this very case has left all that `resume` needs. What else may keep that from going on (a full
+// disk, somebody else at work there) passes, so the run is not given up for it.
 bool can_go_on(const fs::path& folder, const std::string& case_text) {
   try {
     if (!fs::exists(folder / "case.toml") || read_whole_file(folder / "case.toml") != case_text) return false;
     std::string passed_over;
-    newest_checkpoint(folder, passed_over);
-    return true;
+    const Checkpoint from = newest_checkpoint(folder, passed_over);
+    const CheckpointFacts facts = facts_of(from);
+    const auto sets = available_instruction_sets();
+    const bool kernels = from.reproducible || std::any_of(sets.begin(), sets.end(), [&](InstructionSet set) { return to_string(set) == from.instruction_set; });
+    read_series(folder / "series.csv", facts.rows);
+    if (!facts.closed.empty()) Hdf5File::open(folder / "results.h5");
+    return kernels && from.case_text == case_text;
   } catch (const std::exception&) {
     return false;
   }
@@ -163,7 +170,6 @@ class Runner {
     pid_t pid;
     std::size_t job;
     std::size_t attempt;  // number of the try; 0: the run itself
-    bool resumed;
     double steps_before;         // made before it took the run up
     Clock::time_point begin;
     std::optional<double> steal;
@@ -236,7 +242,7 @@ class Runner {
     write_whole_file(file, c.text);
     wait_until_free(folder);
     std::vector<std::string> words{"platen"};
-    const bool resumed = attempt == 0 && !job.timed && !from_the_start_.contains(k) && can_go_on(folder, c.text);
+    const bool resumed = attempt == 0 && !job.timed && can_go_on(folder, c.text);
     if (resumed)
       words.insert(words.end(), {"resume", folder.string()});
     else
@@ -247,7 +253,7 @@ class Runner {
     const std::optional<double> steal = job.timed ? steal_seconds() : std::nullopt;
     const auto steps_before = resumed ? last_step(folder / "series.csv") : std::nullopt;
     children_.push_back(
-        {start(options_.program, words, options_.folder / "logs" / (name + ".txt")), k, attempt, resumed, static_cast<double>(steps_before.value_or(0)), Clock::now(), steal, folder / "series.csv",
+        {start(options_.program, words, options_.folder / "logs" / (name + ".txt")), k, attempt, static_cast<double>(steps_before.value_or(0)), Clock::now(), steal, folder / "series.csv",
          static_cast<double>(c.particles.table ? static_cast<std::int64_t>(c.particles.table->size()) : c.particles.count)});
     newest_ = title(k, attempt, " try ");
   }
@@ -284,12 +290,6 @@ class Runner {
     } else if (child.attempt > 0 && match_state(plan_, job, options_.folder).tries.size() >= child.attempt) {
       outcome.state = JobState::waiting;
       queue_.insert(queue_.begin(), child.job);  // the next try, or the run, before jobs that have not begun
-      return;
-    } else if (child.resumed && (exit_code == exit_io || exit_code == exit_case)) {
-      // Whatever keeps it from going on (other kernels, a damaged file): it can still be made anew.
-      from_the_start_.insert(child.job);
-      outcome.state = JobState::waiting;
-      queue_.insert(queue_.begin(), child.job);
       return;
     } else if (is_done(options_.folder, job)) {
       outcome.state = JobState::done;
@@ -384,7 +384,6 @@ class Runner {
   const RunnerOptions& options_;
   std::vector<JobOutcome> outcomes_;
   std::vector<Clock::time_point> look_at_;  // when a job that waits for its reference is looked at again
-  std::set<std::size_t> from_the_start_;    // jobs whose checkpoints were of no use
   std::vector<std::size_t> queue_;          // jobs of which nothing runs, to be gone on with in this order
   std::string newest_;
   std::vector<Child> children_;
