@@ -106,9 +106,15 @@ void each(V& v, T& s) {
 }
 
 template <class V, class T>
-  requires std::is_same_v<std::remove_const_t<T>, SettleStage> || std::is_same_v<std::remove_const_t<T>, ReleaseStage>
+  requires std::is_same_v<std::remove_const_t<T>, SettleStage>
 void each(V& v, T& s) {
   v("rest", s.rest);
+}
+
+template <class V, class T>
+  requires std::is_same_v<std::remove_const_t<T>, ReleaseStage>
+void each(V& v, T& s) {
+  v("rest", s.rest), v("height_before", s.height_before);
 }
 
 template <class V, class T>

@@ -115,11 +115,12 @@ struct HoldStage {
 
 struct ReleaseStage {
   RestWatch rest;
+  double height_before = 0.0;     // of the bed, with its sides [m]
   void begin(Stand& stand);
   void update(Stand&, const Look&) {}
   std::optional<std::string> done(Stand& stand, const Look& look) { return rest.done(stand, look); }
   std::optional<std::int64_t> last_step(const Stand&) const { return std::nullopt; }
-  void end(Stand&, StageResult&) {}
+  void end(Stand& stand, StageResult& result);
 };
 
 // Unconfined compression to failure: PressStage with a peak to find.

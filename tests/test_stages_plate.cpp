@@ -266,6 +266,16 @@ TEST(Release, DeletesWhatMetThroughTheSidesAndNothingElse) {
   }
 }
 
+// Without cohesion it goes to pieces, and the run says so; a bed that stands has no such warning.
+TEST(Release, ASampleThatFallsOverIsTold) {
+  const auto warned = [](const StageResult& stage) {
+    return std::any_of(stage.warnings.begin(), stage.warnings.end(), [](const std::string& w) { return w.find("fell over or to pieces") != std::string::npos; });
+  };
+  EXPECT_FALSE(warned(protocol_run().stage("release")));
+  const Trial run = run_case(small_bed + fill + quick_settle + press + unload + "[[stage]]\nkind = \"release\"\nmax_duration = \"0.3 s\"\n", {"particles.law.k_adh=0.0"});
+  EXPECT_TRUE(warned(run.outcome.stages.back())) << run.outcome.message;
+}
+
 TEST(Release, TheFreeBedComesToRest) {
   const Trial& run = protocol_run();
   ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;

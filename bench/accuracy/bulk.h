@@ -128,7 +128,7 @@ inline void write_bed(const std::filesystem::path& run, const std::filesystem::p
   if (!out) throw std::runtime_error("cannot write " + csv.string());
 }
 
-// Figures of one run; NaN where the run did not get so far.
+// Figures of one run; NaN where the run did not get so far, and the strength of a column that fell over.
 inline std::map<std::string, double> bulk_figures(const std::filesystem::path& run) {
   std::map<std::string, double> r;
   for (const char* key : {"strain", "porosity", "coordination_number", "strength", "energy", "dt", "work", "seconds", "exit_code"}) r[key] = std::nan("");
@@ -137,6 +137,8 @@ inline std::map<std::string, double> bulk_figures(const std::filesystem::path& r
   r["exit_code"] = summary.value("exit_code", -1);
   r["work"] = 1e-9 * summary.at("performance").value("particle_steps", std::nan(""));  // [1e9 particle-steps]
   r["seconds"] = summary.at("performance").value("wall_seconds", std::nan(""));
+  double height = 0.0;
+  bool fell = false;
   for (const auto& stage : summary.at("stages")) {
     const auto& values = stage.at("values");
     if (stage.at("kind") == "compress" && stage.at("end_reason") != "failed") {
@@ -146,7 +148,10 @@ inline std::map<std::string, double> bulk_figures(const std::filesystem::path& r
       for (const char* key : {"plastic_dissipation", "viscous_dissipation", "sliding_dissipation", "rolling_dissipation"}) dissipated += values.value(key, 0.0);
       r["energy"] = std::fabs(values.value("energy_residual", std::nan(""))) / dissipated;
     }
-    if (stage.at("kind") == "crush") r["strength"] = stage.value("strength", std::nan(""));
+    if (stage.at("kind") == "unload") height = values.value("height", 0.0);
+    // A slender column may fall over without its sides. What a plate finds then is no strength.
+    if (stage.at("kind") == "release") fell = values.value("height", 0.0) < 0.8 * height;
+    if (stage.at("kind") == "crush" && !fell) r["strength"] = stage.value("strength", std::nan(""));
   }
   return r;
 }

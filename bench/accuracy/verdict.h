@@ -45,7 +45,7 @@ struct Verdict {
   const Setting* setting = nullptr;
   const char* quantity = "";
   double mean = 0.0, difference = 0.0, error = 0.0, scatter = 0.0;  // error: standard error of the difference
-  bool complete = false;                                            // every seed gave the quantity
+  bool complete = false;                                            // no run failed
   double bound() const { return std::fabs(difference) + 2.0 * error; }
 };
 
@@ -66,7 +66,9 @@ inline std::vector<Verdict> judge(const std::vector<const Setting*>& settings, c
       if (!crush && std::string(q.key) == "strength") continue;
       const std::vector<double> x = column(figures, v->name, q.key), x0 = column(figures, reference.name, q.key);
       const Moments own = moments(x), first = moments(x0);
-      Verdict r{v, q.key, own.mean, own.mean - first.mean, std::hypot(own.error(), first.error()), first.deviation, own.n == static_cast<int>(x.size())};
+      bool complete = true;
+      for (const double code : column(figures, v->name, "exit_code")) complete = complete && code == 0.0;
+      Verdict r{v, q.key, own.mean, own.mean - first.mean, std::hypot(own.error(), first.error()), first.deviation, complete};
       if (pairs) {
         std::vector<double> d;
         for (std::size_t k = 0; k < std::min(x.size(), x0.size()); ++k) d.push_back(x[k] - x0[k]);

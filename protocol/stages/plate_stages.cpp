@@ -112,8 +112,19 @@ void HoldStage::end(Stand& stand, StageResult& result) { PressStage{}.end(stand,
 
 // ----------------------------------------------------------------------------------------------------------- release
 
+namespace {
+// Of the highest sphere above the bottom [m]; by places alone, so that no forces are found on the way.
+double height_of_bed(const Simulation& sim) {
+  const Particles& p = sim.state();
+  double highest = 0.0;
+  for (std::int32_t k = 0; k < p.count; ++k) highest = std::max(highest, p.z[static_cast<std::size_t>(k)] + p.radius_of(k));
+  return highest - (sim.plane(plate_bottom).present ? sim.plane_position(plate_bottom) : 0.0);
+}
+}  // namespace
+
 void ReleaseStage::begin(Stand& stand) {
   Simulation& sim = stand.sim;
+  height_before = height_of_bed(sim);
   for (int wall : {wall_x_low, wall_x_high, wall_y_low, wall_y_high})
     if (sim.plane(wall).present) sim.remove_plane(wall);
   if (sim.plane(plate_top).present) {
@@ -124,6 +135,14 @@ void ReleaseStage::begin(Stand& stand) {
   }
   sim.open_sides();
   rest.begin(stand);
+}
+
+// A sample that stands a little lower has settled; one that lost a fifth of its height fell over or to pieces, and what a crush
+// finds then is not its strength.
+void ReleaseStage::end(Stand& stand, StageResult& result) {
+  const double height = height_of_bed(stand.sim);
+  if (height < 0.8 * height_before)
+    result.warnings.push_back(fmt::format("the sample fell over or to pieces: {} high with its sides, {} without; a strength found later is not its own; a wider box or more cohesion helps", pretty(height_before, "m"), pretty(height, "m")));
 }
 
 // ------------------------------------------------------------------------------------------------------------- crush
