@@ -127,9 +127,9 @@ Experiment::Course Experiment::begin_stage(std::size_t index, Stand& stand, Stag
   if (spec.kind == StageKind::crush && sim_->confined()) warn("the sides are still there: its strength is not an unconfined one; a stage `release` takes them away");
   sample(index, spec.speed);
   course.residual_before = current_.last.measures.energy_residual, course.dissipated_before = current_.last.measures.ledger.dissipated();
-  course.next_sample = sim_->step() + steps_to_sample();
+  course.next_sample = next_step_of(c_.output.series);
   if (frame_interval(spec) > 0.0) add_frame();
-  course.next_frame = step_of_next_frame(frame_interval(spec));
+  course.next_frame = next_step_of(frame_interval(spec));
   return course;
 }
 
@@ -158,8 +158,8 @@ Experiment::End Experiment::run_stage(std::size_t index, bool on_the_way) {
       guard(m);
       if (on_grid && !first_look && limits_are_due(m, sim_->step() % limits_grid == 0)) {
         watch_time_step(stand, m);
-        if (sim_->step() < next_sample) next_sample = sim_->step() + steps_to_sample();
-        if (sim_->step() < course.next_frame) course.next_frame = step_of_next_frame(frame_interval(spec));
+        if (sim_->step() < next_sample) next_sample = next_step_of(c_.output.series);
+        if (sim_->step() < course.next_frame) course.next_frame = next_step_of(frame_interval(spec));
       }
     }
     // After the time step may have changed.
@@ -173,18 +173,16 @@ Experiment::End Experiment::run_stage(std::size_t index, bool on_the_way) {
       const std::string missing = what_is_missing(stand, sim_->measure(false));
       if (!missing.empty()) current_.end_reason += ": " + missing;
     }
-    if (!over) {
-      if (stop_) over = true, end = End::stopped, current_.end_reason = *stop_, current_.reached = false;
-    }
+    if (!over && stop_) over = true, end = End::stopped, current_.end_reason = *stop_, current_.reached = false;
     if (over) break;
 
     if (sim_->step() >= next_sample) {
       sample(index, speed);
-      next_sample = sim_->step() + steps_to_sample();
+      next_sample = next_step_of(c_.output.series);
     }
     if (sim_->step() >= course.next_frame) {
       add_frame();
-      course.next_frame = step_of_next_frame(frame_interval(spec));
+      course.next_frame = next_step_of(frame_interval(spec));
     }
     std::int64_t target = (sim_->step() / grid + 1) * grid;
     if (exact) target = std::min(target, std::max(*exact, sim_->step() + 1));
@@ -206,11 +204,11 @@ Experiment::End Experiment::run_stage(std::size_t index, bool on_the_way) {
   const double dissipated = m.ledger.dissipated();
   current_.residual_share = !c_.output.energy ? std::numeric_limits<double>::quiet_NaN() : (m.energy_residual - residual_before) / std::max(dissipated - dissipated_before, 0.01 * dissipated);
   if (std::fabs(current_.residual_share) > 0.01) warn(fmt::format("the energy ledger is open by {:.2g} % of what was dissipated; a smaller time step closes it", 100.0 * std::fabs(current_.residual_share)));
-  close(index, stand, stage, stage_begin, end);
+  close(stand, stage, stage_begin, end);
   return end;
 }
 
-void Experiment::close(std::size_t, Stand& stand, Stage& stage, double stage_begin, End end) {
+void Experiment::close(Stand& stand, Stage& stage, double stage_begin, End end) {
   current_.last_step = sim_->step(), current_.time_end = sim_->time();
   current_.wall_seconds = wall_clock() - stage_begin;
   current_.strain_zero_height = strain_zero_height_;

@@ -42,7 +42,7 @@ class Experiment {
   Course begin_stage(std::size_t index, Stand& stand, Stage& stage);
   // `on_the_way`: the checkpoint is one within this stage.
   End run_stage(std::size_t index, bool on_the_way);
-  void close(std::size_t, Stand& stand, Stage& stage, double stage_begin, End end);
+  void close(Stand& stand, Stage& stage, double stage_begin, End end);
   static std::string exact_reason(const StageSpec& spec);
   void guard(const Measures& m);
   void warn(const std::string& text);
@@ -52,10 +52,8 @@ class Experiment {
   // ---- samples
   SeriesRow row_of(const Measures& m, double speed) const;
   void sample(std::size_t stage, double speed);
-  // Steps from now to the first one at or after the next multiple of the sampling interval.
-  std::int64_t steps_to_sample() const;
-  // The same for frames; never where there are none.
-  std::int64_t step_of_next_frame(double interval) const;
+  // The first step behind this one that is at or after a multiple of the interval [s]; never comes where that is 0.
+  std::int64_t next_step_of(double interval) const;
   void add_frame();
   double frame_interval(const StageSpec& spec) const { return spec.frames.value_or(c_.output.frames.value_or(0.0)); }
   void show_progress(std::size_t index, const Stand& stand, const std::optional<std::int64_t>& exact, double stage_begin);

@@ -13,9 +13,7 @@ SeriesRow Experiment::row_of(const Measures& m, double speed) const {
   if (strain_zero_height_) row.strain = 1.0 - m.height / *strain_zero_height_;
   // I = strain rate * d * sqrt(rho/p) [A34]; no meaning without pressure.
   row.inertial_number = std::numeric_limits<double>::quiet_NaN();
-  if (m.stress_top > 0.0 && m.height > 0.0) {
-    row.inertial_number = speed / m.height * 2.0 * sim_->mean_radius() * std::sqrt(density_ / m.stress_top);
-  }
+  if (m.stress_top > 0.0 && m.height > 0.0) row.inertial_number = speed / m.height * 2.0 * sim_->mean_radius() * std::sqrt(density_ / m.stress_top);
   if (!c_.output.energy) {
     const double none = std::numeric_limits<double>::quiet_NaN();
     Measures& r = row.measures;
@@ -32,13 +30,7 @@ void Experiment::sample(std::size_t stage, double speed) {
   folder_.append(current_.last, static_cast<int>(stage));
 }
 
-std::int64_t Experiment::steps_to_sample() const {
-  const double dt = sim_->time_step(), interval = c_.output.series;
-  const double done = std::floor(sim_->time() / interval * (1.0 + 1e-12) + 1e-9);
-  return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(((done + 1.0) * interval - sim_->time()) / dt - 1e-6)));
-}
-
-std::int64_t Experiment::step_of_next_frame(double interval) const {
+std::int64_t Experiment::next_step_of(double interval) const {
   if (!(interval > 0.0)) return std::numeric_limits<std::int64_t>::max();
   const double done = std::floor(sim_->time() / interval * (1.0 + 1e-12) + 1e-9);
   return sim_->step() + std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(((done + 1.0) * interval - sim_->time()) / sim_->time_step() - 1e-6)));

@@ -169,6 +169,17 @@ inline std::vector<StageResult> results(int stages) {
   return list;
 }
 
+// A run on its way: two stages closed, two rows of the third. Whoever drops it has killed it.
+inline RunFolder write_half_a_run(const fs::path& folder) {
+  RunFolder run = RunFolder::create(folder, case_text, false);
+  run.set_info(info());
+  write_stage(run, 0);
+  write_stage(run, 1);
+  run.append(row(2, 0), 2);
+  run.append(row(2, 1), 2);
+  return run;
+}
+
 // A finished run of `stages` stages.
 inline void write_run(const fs::path& folder, int stages = 4, bool contacts = true) {
   RunFolder run = RunFolder::create(folder, case_text, false);

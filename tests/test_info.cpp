@@ -31,12 +31,7 @@ TEST_F(Info, FinishedRun) {
 }
 
 TEST_F(Info, RunThatIsStillGoing) {
-  RunFolder run = RunFolder::create(root / "run", case_text, false);
-  run.set_info(info());
-  write_stage(run, 0);
-  write_stage(run, 1);
-  run.append(row(2, 0), 2);
-  run.append(row(2, 1), 2);
+  const RunFolder run = write_half_a_run(root / "run");
   const std::string series = contents(root / "run/series.csv");
   const std::string text = describe(root / "run", false);
   for (const char* part : {"running", "stress 40 kPa reached", "not ended", "unload"})

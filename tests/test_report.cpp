@@ -86,14 +86,7 @@ TEST_F(Report, NoTextOfACaseEndsTheData) {
 }
 
 TEST_F(Report, ARunThatWasKilled) {
-  {
-    RunFolder run = RunFolder::create(root / "run", case_text, false);
-    run.set_info(info());
-    write_stage(run, 0);
-    write_stage(run, 1);
-    run.append(row(2, 0), 2);
-    run.append(row(2, 1), 2);
-  }
+  write_half_a_run(root / "run");
   const Json run = data_of(report_page({root / "run"})).at(0);
   EXPECT_EQ(run.at("good"), false);
   ASSERT_EQ(run.at("stages").size(), 3u);
