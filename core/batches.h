@@ -56,6 +56,7 @@ struct Batch {
   std::int64_t plate_work = 0;
   std::int64_t rolling = 0;
   double path = 0.0;                  // over a run of steps: sum of the largest way of a step, in units of the room of who goes it
+  double fastest = 0.0;               // speed after the last motion, relative to the common one [m/s]
   bool out_of_range = false;
 };
 

@@ -1,4 +1,4 @@
-// Between fetch and law: which pairs of a chunk have anything to say.
+// Between the two halves of the fetch: which pairs of a chunk have anything to say.
 #pragma once
 
 #include "kernels/chunk.h"
@@ -6,8 +6,9 @@
 
 namespace platen {
 
-// The vectors of a chunk in which something is to be found: where a pair touches, touched at the last step, or has a
-// history to forget. In a bed these are all of them and nearly all their pairs, in a rain a pair here and there.
+// The vectors of a chunk in which something is to be found: where a pair touches, or may have touched at the last step, in
+// which case it may have a history to forget and energy to account for. In a bed these are all of them and nearly all their
+// pairs, in a rain a pair here and there.
 struct ActiveVectors {
   int at[chunk_size];
   unsigned lanes[chunk_size];  // of each, a bit for each pair with something to it; all set where most have
@@ -15,33 +16,16 @@ struct ActiveVectors {
   int pairs = 0;               // bits set
 };
 
+// Which these are. No pair can have parted farther in the last step than `leap`, so one that is farther apart did not touch
+// then, and its history has been cleared since. A pair whose place is no number counts, and so
+// does padding, which has no distance: law and output mask it.
 template <class I, SceneTraits scene>
-PLATEN_INLINE unsigned pairs_with_history(const PairBatch& b, std::int32_t k) {
-  using Real = typename I::Real;
-  Real size = (I::abs(I::load(b.tx + k)) + I::abs(I::load(b.ty + k))) + I::abs(I::load(b.tz + k));
-  if constexpr (scene.plasticity) size = size + I::abs(I::load(b.sp + k));
-  if constexpr (scene.exponent != Exponent::one) size = size + I::abs(I::load(b.k_t_last + k));
-  return I::bits(I::negate(I::set(0.0) >= size));
-}
-
-// Which these are; `shortest` becomes the shortest lever of either side, a/R, if it was not before.
-template <class I, SceneTraits scene, bool guarded>
-PLATEN_INLINE ActiveVectors active_vectors(const Chunk<scene>& chunk, const PairBatch& b, double dt, std::int32_t start, int count,
-                                           typename SingleOf<I>::Type::Real& shortest) {
-  using Real = typename I::Real;
-  const Real zero = I::set(0.0);
+PLATEN_INLINE ActiveVectors active_vectors(const Chunk<scene>& chunk, const PairBatch& b, int count) {
   constexpr unsigned all = I::width < 32 ? (1u << I::width) - 1u : ~0u;
   ActiveVectors active;
   for (int at = 0; at < count; at += I::width) {
-    // Padding, whose lever is no number, leaves the second operand as it is.
-    if constexpr (guarded)
-      for (int side = 0; side < Chunk<scene>::sides; ++side) shortest = SingleOf<I>::min(I::load(chunk.lever[side] + at), shortest);
-    const Real delta = I::load(chunk.delta + at), before = I::fma(I::load(chunk.v_n + at), I::set(dt), delta);
-    unsigned lanes = I::bits(I::either(delta > zero, before > zero));
-    if (2 * __builtin_popcount(lanes) > I::width)
-      lanes = all;  // to look at the history of the rest would cost more than it saves
-    else
-      lanes |= pairs_with_history<I, scene>(b, start + at);
+    unsigned lanes = I::bits(I::negate(I::load(chunk.delta + at) < I::set(-b.leap)));
+    if (2 * __builtin_popcount(lanes) > I::width) lanes = all;
     active.at[active.count] = at;
     active.lanes[active.count] = lanes;
     active.count += lanes != 0;
@@ -71,7 +55,7 @@ class GatheredPairs {
         const int at = active.at[m] + __builtin_ctz(lanes);
         const std::int32_t k = start + at;
         chunk.move(n, at);
-        from_[n] = k, i_[n] = b.i[k], slot_j_[n] = b.slot_j[k];
+        from_[n] = k, i_[n] = b.i[k], j_[n] = b.j[k], slot_j_[n] = b.slot_j[k];
         tx_[n] = b.tx[k], ty_[n] = b.ty[k], tz_[n] = b.tz[k];
         if constexpr (scene.plasticity) sp_[n] = b.sp[k];
         if constexpr (scene.exponent != Exponent::one) k_t_last_[n] = b.k_t_last[k];
@@ -82,15 +66,15 @@ class GatheredPairs {
     for (int at = 0; at < n; at += I::width) active.at[active.count++] = at;
     for (; n % I::width != 0; ++n) {  // never entered with n = 0, so that n - 1 is a pair
       chunk.move(n, n - 1);
-      chunk.delta[n] = -1.0, chunk.v_n[n] = 0.0;
-      i_[n] = i_[n - 1], slot_j_[n] = i_[n] - b.first;
+      chunk.delta[n] = -1.0;
+      i_[n] = j_[n] = i_[n - 1], slot_j_[n] = i_[n] - b.first;
       tx_[n] = ty_[n] = tz_[n] = sp_[n] = k_t_last_[n] = 0.0;
     }
   }
 
   PairBatch view(const PairBatch& b) {
     PairBatch v = b;
-    v.i = i_, v.slot_j = slot_j_, v.j = nullptr;  // fetched already
+    v.i = i_, v.j = j_, v.slot_j = slot_j_;
     v.tx = tx_, v.ty = ty_, v.tz = tz_, v.sp = sp_, v.k_t_last = k_t_last_;
     return v;
   }
@@ -107,7 +91,7 @@ class GatheredPairs {
  private:
   using Column = typename Chunk<scene>::Column;
   alignas(64) Column tx_, ty_, tz_, sp_, k_t_last_;
-  alignas(64) std::int32_t from_[chunk_size], i_[chunk_size], slot_j_[chunk_size];
+  alignas(64) std::int32_t from_[chunk_size], i_[chunk_size], j_[chunk_size], slot_j_[chunk_size];
   int count_ = 0;
 };
 

@@ -9,31 +9,29 @@
 
 namespace platen {
 
-// Geometry and relative motion of `width` pairs. The normal points from j to i.
-template <class I>
-struct Pairs {
-  typename I::Real delta;                    // overlap [m]
-  Vec3<I> n;                                 // unit normal
-  typename I::Real v_n;                      // normal relative velocity, positive when parting [m/s]
-  Vec3<I> v_t;                               // tangential relative velocity at the contact point [m/s]
-  typename I::Real lever_i, lever_j;         // a/R [-]
-  typename I::Real R_i, R_j, m_i, m_j;       // unequal spheres only
-  Vec3<I> w;                                 // relative spin [rad/s], relative rolling only
-};
-
-// What the phases hand on, for one chunk: small enough to stay in the first cache.
+// What the phases hand on, for one chunk: small enough to stay in the first cache. The normal points from j to i, v_n is
+// positive when the spheres part, v_t is at the contact point, a lever is a/R.
 //
-//   fetch  ->  delta n v_n v_t lever (R m w)  ->  law  ->  F T S  ->  output
+//   fetch geometry   delta n 1/distance (R)
+//   active pairs       |
+//   fetch motion       |  v_n v_t lever (m w)
+//   law: springs       |   |   turned limit f_n (k_t beta_n)   S
+//   law: forces        `---`----`------------------------->    |   F T
+//   output                                                     `---`-->
 template <SceneTraits scene>
 struct Chunk {
   static constexpr int sides = scene.equal_spheres ? 1 : 2;  // of unequal spheres, each has its own
   using Column = double[chunk_size];
-  alignas(64) Column delta;
+  alignas(64) Column delta;     // overlap [m]
   alignas(64) Column n[3];
-  alignas(64) Column v_n;
+  alignas(64) Column inverse;   // 1/distance [1/m]
+  alignas(64) Column v_n;       // [m/s]
   alignas(64) Column v_t[3];
   alignas(64) Column lever[sides];
   alignas(64) Column R[2], m[2], w[3];
+  alignas(64) Column turned[3];    // tangential spring, turned with the normal [N]
+  alignas(64) Column limit, f_n;   // of the tangential force; normal force [N]
+  alignas(64) Column k_t, beta_n;  // of each pair: exponent other than 1, or unequal spheres
   alignas(64) Column F[3];
   alignas(64) Column T[sides][3];
   alignas(64) Column S[sides];
@@ -47,26 +45,12 @@ struct Chunk {
     return {I::load(from[0] + at), I::load(from[1] + at), I::load(from[2] + at)};
   }
 
-  template <class I>
-  PLATEN_INLINE void put_pairs(int at, const Pairs<I>& p) {
-    I::store(delta + at, p.delta), I::store(v_n + at, p.v_n), I::store(lever[0] + at, p.lever_i);
-    put<I>(n, at, p.n), put<I>(v_t, at, p.v_t);
-    if constexpr (!scene.equal_spheres) {
-      I::store(lever[1] + at, p.lever_j);
-      I::store(R[0] + at, p.R_i), I::store(R[1] + at, p.R_j), I::store(m[0] + at, p.m_i), I::store(m[1] + at, p.m_j);
-    }
-    if constexpr (scene.rolling == Rolling::relative) put<I>(w, at, p.w);
-  }
-  // What was fetched of one pair, to another place of the chunk.
+  // Geometry of one pair, to another place of the chunk.
   PLATEN_INLINE void move(int to, int from) {
-    delta[to] = delta[from], v_n[to] = v_n[from];
-    for (int axis = 0; axis < 3; ++axis) n[axis][to] = n[axis][from], v_t[axis][to] = v_t[axis][from];
-    for (int side = 0; side < sides; ++side) {
-      lever[side][to] = lever[side][from];
-      if constexpr (!scene.equal_spheres) R[side][to] = R[side][from], m[side][to] = m[side][from];
-    }
-    if constexpr (scene.rolling == Rolling::relative)
-      for (int axis = 0; axis < 3; ++axis) w[axis][to] = w[axis][from];
+    delta[to] = delta[from], inverse[to] = inverse[from];
+    for (int axis = 0; axis < 3; ++axis) n[axis][to] = n[axis][from];
+    if constexpr (!scene.equal_spheres)
+      for (int side = 0; side < 2; ++side) R[side][to] = R[side][from];
   }
   // Fields of the records of one side, in their order.
   template <class I>
@@ -98,6 +82,11 @@ class PairsOfChunk {
   PLATEN_INLINE Real R(int side) const { return read(offsetof(Columns, R) + side * column); }
   PLATEN_INLINE Real m(int side) const { return read(offsetof(Columns, m) + side * column); }
   PLATEN_INLINE Vec3<I> w() const { return read3(offsetof(Columns, w)); }
+  PLATEN_INLINE Vec3<I> turned() const { return read3(offsetof(Columns, turned)); }
+  PLATEN_INLINE Real limit() const { return read(offsetof(Columns, limit)); }
+  PLATEN_INLINE Real f_n() const { return read(offsetof(Columns, f_n)); }
+  PLATEN_INLINE Real k_t() const { return read(offsetof(Columns, k_t)); }
+  PLATEN_INLINE Real beta_n() const { return read(offsetof(Columns, beta_n)); }
 
  private:
   using Columns = Chunk<scene>;

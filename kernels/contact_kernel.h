@@ -1,39 +1,44 @@
 // One pass over the pairs that a batch owns: fetch -> law -> output [docs/architecture.md, "The contact kernel"].
 #pragma once
 
+#include "kernels/active_pairs.h"
 #include "kernels/fetch_phase.h"
 #include "kernels/law_phase.h"
 #include "kernels/output_phase.h"
 
 namespace platen {
 
-// Three loops over each chunk instead of one with everything in it: a processor looks a few hundred instructions ahead,
+// Five loops over each chunk instead of one with everything in it: a processor looks a few hundred instructions ahead,
 // so only short bodies let the next contacts begin while the last ones wait for their results.
 template <class I, SceneTraits scene, bool exact, bool guarded = true>
 void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairTotals& totals) noexcept {
+  using Wide = typename Interleaved<I>::Type;
   const PairBatch b = batch;  // copies, which no store through a pointer can change
   const LawConstants c = constants;
   typename I::Record carried = I::zero_record();
   std::int32_t owner = -1;
   bool fine = true;
   Chunk<scene> chunk;
-  GatheredPairs<typename Interleaved<I>::Type, scene> gathered;
+  GatheredPairs<Wide, scene> gathered;
   alignas(64) const double nothing[record_size] = {};
   typename I::Real shortest_lever = I::set(1.0);
   for (std::int32_t start = 0; start < b.count; start += chunk_size) {
     const int count = start + chunk_size < b.count ? chunk_size : b.count - start;
     if (c.width > 0.0)
-      for (int at = 0; at < count; at += I::width)
-        chunk.template put_pairs<I>(at, fetch_pairs<I, scene, exact, true>(b, c, start + at));
+      for (int at = 0; at < count; at += I::width) fetch_geometry<I, scene, exact, true>(chunk, at, b, c, start + at);
     else
-      for (int at = 0; at < count; at += I::width)
-        chunk.template put_pairs<I>(at, fetch_pairs<I, scene, exact, false>(b, c, start + at));
-    using Wide = typename Interleaved<I>::Type;
-    ActiveVectors active = active_vectors<Wide, scene, guarded>(chunk, b, c.dt, start, count, shortest_lever);
+      for (int at = 0; at < count; at += I::width) fetch_geometry<I, scene, exact, false>(chunk, at, b, c, start + at);
+    ActiveVectors active = active_vectors<Wide, scene>(chunk, b, count);
     const bool few = GatheredPairs<Wide, scene>::worth(active);
     if (few) gathered.take(chunk, b, start, active);
     const PairBatch seen = few ? gathered.view(b) : b;
     const std::int32_t first = few ? 0 : start;
+    for (int m = 0; m < active.count; ++m)
+      for (int at = active.at[m]; at < active.at[m] + Wide::width; at += I::width) {
+        const auto lever = fetch_motion<I, scene>(chunk, at, seen, c, first + at);
+        // Padding, whose lever is no number, leaves the second operand as it is.
+        if constexpr (guarded) shortest_lever = I::min(lever, shortest_lever);
+      }
     fine = law_of_chunk<Wide, scene, exact, guarded>(chunk, seen, c, first, active, totals) && fine;
     // An overlap above R, the centre of one sphere deep inside the other, is no contact any more: a lever below 1/2.
     // Forces are looked at only where overlaps let them be too large [docs/decisions.md, "Guards where overlaps are deep"].

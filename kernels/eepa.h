@@ -80,48 +80,36 @@ PLATEN_INLINE NormalResponse<I> normal_response(typename I::Real s, typename I::
   return {sp, f_hys, height};
 }
 
-// The tangential spring before its limit, and what is needed to cut it and to say what the cut takes.
-template <class I>
-struct TrialSpring {
-  Vec3<I> T;                        // [N]
-  typename I::Real size2;           // |T|^2 [N2]
-  typename I::Real was2;            // |T|^2 of the step before [N2]
-  typename I::Real along;           // T . (spring before the advance, turned) [N2]
-};
-
-// Turns the stored spring into the tangent plane of normal n keeping its length, and advances it by -k_t v_t dt [Eq. 5].
+// The stored tangential spring, turned into the tangent plane of normal n with its length kept [Eq. 5]; was2 = |T_old|^2.
 template <class I, bool exact>
-PLATEN_INLINE TrialSpring<I> trial_spring(const Vec3<I>& T_old, const Vec3<I>& n, const Vec3<I>& v_t, typename I::Real k_t, double dt) {
+PLATEN_INLINE Vec3<I> turned_spring(const Vec3<I>& T_old, const Vec3<I>& n, const typename I::Real& was2) {
   using Real = typename I::Real;
   const Vec3<I> flat = sub_scaled<I>(T_old, dot(T_old, n), n);
-  const Real was2 = dot(T_old, T_old), product = was2 * dot(flat, flat);
+  const Real product = was2 * dot(flat, flat);
   // length/|flat| = length^2 / sqrt(length^2 |flat|^2); springs too small to square are left as they are.
   const Real tiny = I::set(0x1p-900);
-  const Real stretch = I::where(product > tiny, was2 * inverse_sqrt<I, exact>(I::max(product, tiny)), I::set(1.0));
-  const Vec3<I> T = sub_scaled<I>(scale<I>(stretch, flat), k_t * I::set(dt), v_t);
-  return {T, dot(T, T), was2, stretch * dot(flat, T)};
+  return scale<I>(I::where(product > tiny, was2 * inverse_sqrt<I, exact>(I::max(product, tiny)), I::set(1.0)), flat);
 }
 
+// How a spring T is cut back to its limit [Eq. 9, 10].
 template <class I>
-struct LimitedSpring {
-  Vec3<I> T;                        // after the step [N]
-  typename I::Mask cut;             // the limit holds: sliding
-  typename I::Real loss;            // 2 k_t times the energy that sliding takes [N2]
+struct Cut {
+  typename I::Mask slides;          // the limit holds
+  typename I::Real back;            // what is left of T, 0..1
 };
-
-// Cuts a spring back to the limit [Eq. 9, 10].
 template <class I, bool exact>
-PLATEN_INLINE LimitedSpring<I> limited_spring(const TrialSpring<I>& trial, typename I::Real limit) {
-  using Real = typename I::Real;
-  const Real limit2 = limit * limit;
+PLATEN_INLINE Cut<I> cut_to(const typename I::Real& limit, const typename I::Real& size2) {
   // Also where both are 0 (no dashpot on a frictionless contact), and where a spring is no number: its loss is none then,
   // which the sum of energies shows.
-  const auto cut = I::not_less(trial.size2, limit2);
-  const Real back = I::where(cut, limit * inverse_sqrt<I, exact>(I::max(trial.size2, I::set(0x1p-900))), I::set(1.0));
-  // Work of the mean of the old and the new spring over the slip that did not stretch it: (T_old + T)(T_trial - T).
-  const Real over = I::set(1.0) - back;
-  const Real loss = I::where(cut, over * I::fma(back, trial.size2, trial.along), I::set(0.0));
-  return {scale<I>(back, trial.T), cut, loss};
+  const auto slides = I::not_less(size2, limit * limit);
+  return {slides, I::where(slides, limit * inverse_sqrt<I, exact>(I::max(size2, I::set(0x1p-900))), I::set(1.0))};
+}
+
+// 2 k_t times the energy that sliding takes where T, |T|^2 = size2, is cut to back T: the work of the mean of the old and
+// the new spring over the slip that did not stretch it, (T_old + T_new)(T - T_new), with along = T_old . T [N2].
+template <class I>
+PLATEN_INLINE typename I::Real sliding_loss(const Cut<I>& cut, const typename I::Real& size2, const typename I::Real& along) {
+  return I::where(cut.slides, (I::set(1.0) - cut.back) * I::fma(cut.back, size2, along), I::set(0.0));
 }
 
 // Energy that plastic flow takes when s_p goes from `sp_old` to `sp`: a function of s_p alone, hence exact for any step

@@ -1,85 +1,101 @@
-// First phase of the contact kernel: both spheres of each pair, its geometry and relative motion.
+// First phase of the contact kernel: where both spheres of each pair are, then how they move. Two loops, with the choice of
+// pairs that have anything to say between them (active_pairs.h): most pairs of a rain are looked at no further.
 #pragma once
 
 #include "kernels/chunk.h"
 
 namespace platen {
 
+// Four numbers of the row of each of `width` spheres: part 0 x y z R, 1 vx vy vz m, 2 ux uy uz 1/R.
 template <class I>
-struct Fetched {
-  typename I::Real row[12];
+struct RowPart {
+  typename I::Real of[4];
 };
 template <class I>
-PLATEN_INLINE Fetched<I> fetch_rows(const double* rows, const std::int32_t* index) {
-  Fetched<I> f;
-  I::fetch_rows(rows, index, f.row);
+PLATEN_INLINE RowPart<I> fetch_part(const double* rows, int part, const std::int32_t* index) {
+  RowPart<I> f;
+  I::fetch_rows(rows + 4 * part, index, f.of);
   return f;
 }
 // The owner side. Consecutive contacts share owners, and owners follow each other along the curve: eight contacts mostly
 // have theirs within eight places, which one load and one permutation per field bring.
-template <class I, SceneTraits scene>
-PLATEN_INLINE Fetched<I> fetch_owners(const PairBatch& b, std::int32_t k) {
-  if constexpr (requires { typename I::Half; }) {
-    const auto first = fetch_owners<typename I::Half, scene>(b, k), second = fetch_owners<typename I::Half, scene>(b, k + I::half);
-    Fetched<I> f;
-    for (int m = 0; m < 12; ++m) f.row[m] = {first.row[m], second.row[m]};
-    return f;
-  } else {
-    if constexpr (I::picks && scene.equal_spheres) {
-      const std::int32_t base = b.i[k];
-      if (b.i[k + I::width - 1] - base < I::width && base + I::width <= b.end) {
-        const auto where = I::places(b.i + k, base);
-        const auto pick = [&](const double* column) { return I::pick(column + base, where); };
-        const auto none = I::set(0.0);
-        return {{pick(b.x), pick(b.y), pick(b.z), none, pick(b.vx), pick(b.vy), pick(b.vz), none, pick(b.ux), pick(b.uy),
-                 pick(b.uz), none}};
+template <class I, SceneTraits scene, int parts>
+PLATEN_INLINE void fetch_owners(const PairBatch& b, int first_part, std::int32_t k, RowPart<I> (&f)[parts]) {
+  if constexpr (I::picks && scene.equal_spheres) {
+    const std::int32_t base = b.i[k];
+    if (b.i[k + I::width - 1] - base < I::width && base + I::width <= b.end) {
+      const auto where = I::places(b.i + k, base);
+      const double* const columns[3][3] = {{b.x, b.y, b.z}, {b.vx, b.vy, b.vz}, {b.ux, b.uy, b.uz}};
+      for (int part = 0; part < parts; ++part) {
+        for (int axis = 0; axis < 3; ++axis) f[part].of[axis] = I::pick(columns[first_part + part][axis] + base, where);
+        f[part].of[3] = I::set(0.0);
       }
+      return;
     }
-    return fetch_rows<I>(b.rows, b.i + k);
   }
+  for (int part = 0; part < parts; ++part) f[part] = fetch_part<I>(b.rows, first_part + part, b.i + k);
 }
 
+// Distance, normal and overlap of `width` pairs from `k` on.
 template <class I, SceneTraits scene, bool exact, bool periodic>
-PLATEN_INLINE Pairs<I> fetch_pairs(const PairBatch& b, const LawConstants& c, std::int32_t k) {
+PLATEN_INLINE void fetch_geometry(Chunk<scene>& chunk, int at, const PairBatch& b, const LawConstants& c, std::int32_t k) {
   using Real = typename I::Real;
-  const Fetched<I> i = fetch_owners<I, scene>(b, k), j = fetch_rows<I>(b.rows, b.j + k);
-  Pairs<I> p;
+  RowPart<I> i[1];
+  fetch_owners<I, scene>(b, 0, k, i);
+  const RowPart<I> j = fetch_part<I>(b.rows, 0, b.j + k);
   // Nearest image: an odd function that changes no bit of a pair inside the box.
-  Vec3<I> d = {i.row[0] - j.row[0], i.row[1] - j.row[1], i.row[2] - j.row[2]};
+  Vec3<I> d = {i[0].of[0] - j.of[0], i[0].of[1] - j.of[1], i[0].of[2] - j.of[2]};
   if constexpr (periodic) {
     d.x = I::fnma(I::set(c.width), I::round(d.x * I::set(c.inverse_width)), d.x);
     d.y = I::fnma(I::set(c.depth), I::round(d.y * I::set(c.inverse_depth)), d.y);
   }
   const Real distance2 = dot(d, d);
   const Real inverse = inverse_sqrt<I, exact>(distance2);
-  p.n = scale<I>(inverse, d);
-  Real inverse_R_i, inverse_R_j, reach;
+  Real reach;
   if constexpr (scene.equal_spheres) {
     reach = I::set(c.radius + c.radius);
+  } else {
+    reach = i[0].of[3] + j.of[3];
+    I::store(chunk.R[0] + at, i[0].of[3]), I::store(chunk.R[1] + at, j.of[3]);
+  }
+  I::store(chunk.delta + at, reach - distance2 * inverse);
+  I::store(chunk.inverse + at, inverse);
+  chunk.template put<I>(chunk.n, at, scale<I>(inverse, d));
+}
+
+// Relative motion of `width` pairs, whose geometry is in the chunk; the shorter lever of each.
+template <class I, SceneTraits scene>
+PLATEN_INLINE typename I::Real fetch_motion(Chunk<scene>& chunk, int at, const PairBatch& b, const LawConstants& c, std::int32_t k) {
+  using Real = typename I::Real;
+  RowPart<I> i[2];
+  fetch_owners<I, scene>(b, 1, k, i);
+  const RowPart<I> j[2] = {fetch_part<I>(b.rows, 1, b.j + k), fetch_part<I>(b.rows, 2, b.j + k)};
+  const Vec3<I> n = chunk.template take<I>(chunk.n, at);
+  const Real half = I::set(0.5) * I::load(chunk.delta + at);
+  Real inverse_R_i, inverse_R_j;
+  if constexpr (scene.equal_spheres) {
     inverse_R_i = inverse_R_j = I::set(c.inverse_radius);
   } else {
-    p.R_i = i.row[3], p.R_j = j.row[3], p.m_i = i.row[7], p.m_j = j.row[7];
-    reach = p.R_i + p.R_j;
-    inverse_R_i = i.row[11], inverse_R_j = j.row[11];
+    inverse_R_i = i[1].of[3], inverse_R_j = j[1].of[3];
+    I::store(chunk.m[0] + at, i[0].of[3]), I::store(chunk.m[1] + at, j[0].of[3]);
   }
-  p.delta = reach - distance2 * inverse;
-  const Real half = I::set(0.5) * p.delta;
-  p.lever_i = I::set(1.0) - half * inverse_R_i;
-  if constexpr (scene.equal_spheres)
-    p.lever_j = p.lever_i;
-  else
-    p.lever_j = I::set(1.0) - half * inverse_R_j;
-  const Vec3<I> v = {i.row[4] - j.row[4], i.row[5] - j.row[5], i.row[6] - j.row[6]};
+  const Real lever_i = I::set(1.0) - half * inverse_R_i;
+  const Real lever_j = scene.equal_spheres ? lever_i : I::set(1.0) - half * inverse_R_j;
+  I::store(chunk.lever[0] + at, lever_i);
+  if constexpr (!scene.equal_spheres) I::store(chunk.lever[1] + at, lever_j);
+  const Vec3<I> v = {i[0].of[0] - j[0].of[0], i[0].of[1] - j[0].of[1], i[0].of[2] - j[0].of[2]};
   // Written per side in every scene, and symmetric in i and j to the last bit.
-  const Vec3<I> u_i = {i.row[8], i.row[9], i.row[10]}, u_j = {j.row[8], j.row[9], j.row[10]};
-  const Vec3<I> spin = scale<I>(p.lever_i, u_i) + scale<I>(p.lever_j, u_j);
-  p.v_n = dot(v, p.n);
+  const Vec3<I> u_i = {i[1].of[0], i[1].of[1], i[1].of[2]}, u_j = {j[1].of[0], j[1].of[1], j[1].of[2]};
+  const Vec3<I> spin = scale<I>(lever_i, u_i) + scale<I>(lever_j, u_j);
+  const Real v_n = dot(v, n);
+  I::store(chunk.v_n + at, v_n);
   // Velocities are half a step old, and so is the normal that spins act around. What that changes in the tangent plane comes
   // from the spin about n alone [docs/laws.md, "Pairs"].
-  const Real lag = (I::set(0.5 * c.dt) * inverse) * dot(spin, p.n);
-  p.v_t = sub_scaled<I>(v, p.v_n, p.n) + cross(p.n, add_scaled<I>(spin, lag, v));
-  if constexpr (scene.rolling == Rolling::relative) p.w = scale<I>(inverse_R_i, u_i) - scale<I>(inverse_R_j, u_j);
-  return p;
+  const Real lag = (I::set(0.5 * c.dt) * I::load(chunk.inverse + at)) * dot(spin, n);
+  chunk.template put<I>(chunk.v_t, at, sub_scaled<I>(v, v_n, n) + cross(n, add_scaled<I>(spin, lag, v)));
+  if constexpr (scene.rolling == Rolling::relative)
+    chunk.template put<I>(chunk.w, at, scale<I>(inverse_R_i, u_i) - scale<I>(inverse_R_j, u_j));
+  return scene.equal_spheres ? lever_i : I::min(lever_i, lever_j);
 }
 
 }  // namespace platen

@@ -27,37 +27,36 @@ struct ChunkSums {
   }
 };
 
-// Forces of `width` pairs from position `at` of a chunk on; reads and advances their history, adds their energies.
-// In an order that needs few numbers at a time: the tangential spring before its limit, the normal force and with it the
-// limit, the spring after it, dashpots, and what goes to each side.
+// K1 is the same for all pairs of equal spheres with exponent 1, and so are the constants that follow from it.
+template <SceneTraits scene>
+inline constexpr bool common_constants = scene.exponent == Exponent::one && scene.equal_spheres;
+
+// First half of the law: of `width` pairs from position `at` of a chunk on, the normal force, what it limits, and the
+// tangential spring turned with the normal. Advances the plastic overlap and adds what that takes.
+//
+// Two halves, since each is one long chain of dependent operations with an inverse root in the middle: with both in one
+// loop a processor sees too few pairs at a time to fill the waits [docs/decisions.md, "The law in two halves"].
 template <class I, SceneTraits scene, bool exact>
-PLATEN_INLINE void pair_forces(Chunk<scene>& chunk, int at, const PairBatch& b, const LawConstants& c, std::int32_t k,
-                               ChunkSums<I>& sums) {
-  static_assert(scene.rolling != Rolling::relative || !scene.equal_spheres, "relative rolling is built for unequal spheres only");
+PLATEN_INLINE void springs_of_pairs(Chunk<scene>& chunk, int at, const PairBatch& b, const LawConstants& c, std::int32_t k,
+                                    ChunkSums<I>& sums) {
   using Real = typename I::Real;
   using Energy = PairEnergies<typename SingleOf<I>::Type>;
   const PairsOfChunk<I, scene> pairs(chunk, at);
   const Real zero = I::set(0.0);
-  const Vec3<I> none = {zero, zero, zero};
   const auto touching = pairs.delta() > zero;
   sums.contacts += I::count(touching);
-  Real beta_n, k_t;
-  if constexpr (scene.exponent == Exponent::one && scene.equal_spheres) {
-    beta_n = I::set(c.beta_n);
-    k_t = I::set(c.k_t);
-  } else {
-    static_assert(!scene.equal_spheres, "other exponents are built for unequal spheres only");
-    const Real m_i = pairs.m(0), m_j = pairs.m(1), m = (m_i * m_j) / (m_i + m_j);
-    const Real K1 = loading_slope<I, scene.exponent>(I::where(touching, pairs.delta(), zero), c);
-    beta_n = I::sqrt(I::set(c.damping) * m * K1);
-    k_t = I::set(c.ratio) * K1;
+
+  // spring before its advance [Eq. 5]
+  const Vec3<I> T_old = {I::load(b.tx + k), I::load(b.ty + k), I::load(b.tz + k)};
+  const Real was2 = dot(T_old, T_old);
+  chunk.template put<I>(chunk.turned, at, turned_spring<I, exact>(T_old, pairs.n(), was2));
+  if constexpr (scene.energy && scene.exponent == Exponent::one) {
+    // Springs of pairs that have parted; few ever do.
+    if (I::any(I::both(was2 > zero, I::negate(touching))))
+      sums.add(&Energy::sliding, I::where(touching, zero, was2) * I::set(c.half_over_k_t), c);
   }
 
-  // spring before its limit [Eq. 5]
-  const Vec3<I> T_old = {I::load(b.tx + k), I::load(b.ty + k), I::load(b.tz + k)};
-  const TrialSpring<I> trial = trial_spring<I, exact>(T_old, pairs.n(), pairs.v_t(), k_t, c.dt);
-
-  // f_hys [Eq. 2], F_n [Eq. 1, 3, 4]
+  // f_hys [Eq. 2], F_n [Eq. 1, 3, 4], limit [Eq. 9, 10, A11]
   const Real s = overlap_power<I, scene.exponent>(I::where(touching, pairs.delta(), zero), c);
   const Real sp_old = scene.plasticity ? I::load(b.sp + k) : zero;
   const NormalResponse<I> normal = normal_response<I, scene>(s, sp_old, c);
@@ -65,36 +64,71 @@ PLATEN_INLINE void pair_forces(Chunk<scene>& chunk, int at, const PairBatch& b, 
     I::store(b.sp + k, normal.sp);  // 0 when apart, since s = 0
     if constexpr (scene.energy) sums.add(&Energy::plastic, plastic_dissipation<I, scene.exponent>(sp_old, normal.sp, c), c);
   }
-  const Real f_n = normal.f_hys - beta_n * pairs.v_n();
+  Real beta_n;
+  if constexpr (common_constants<scene>) {
+    beta_n = I::set(c.beta_n);
+  } else {
+    static_assert(!scene.equal_spheres, "other exponents are built for unequal spheres only");
+    const Real m_i = pairs.m(0), m_j = pairs.m(1), m = (m_i * m_j) / (m_i + m_j);
+    const Real K1 = loading_slope<I, scene.exponent>(I::where(touching, pairs.delta(), zero), c);
+    beta_n = I::sqrt(I::set(c.damping) * m * K1);
+    I::store(chunk.beta_n + at, beta_n);
+    I::store(chunk.k_t + at, I::set(c.ratio) * K1);
+  }
+  I::store(chunk.f_n + at, normal.f_hys - beta_n * pairs.v_n());
+  I::store(chunk.limit + at, I::set(c.mu) * I::abs(normal.height));
   const Real strength = I::abs(normal.f_hys);
   if constexpr (scene.rolling == Rolling::absolute) {
-    const Real S_i = I::where(touching, strength * pairs.lever(0), zero);
-    I::store(chunk.S[0] + at, S_i);
+    I::store(chunk.S[0] + at, I::where(touching, strength * pairs.lever(0), zero));
     if constexpr (!scene.equal_spheres) I::store(chunk.S[1] + at, I::where(touching, strength * pairs.lever(1), zero));
+  } else if constexpr (scene.rolling == Rolling::relative) {
+    I::store(chunk.S[0] + at, strength);  // for the second half
   }
+}
 
-  // limit [Eq. 9, 10, A11]
-  const LimitedSpring<I> spring = limited_spring<I, exact>(trial, I::set(c.mu) * I::abs(normal.height));
-  const Vec3<I> T_new = where<I>(touching, spring.T, none);
-  I::store(b.tx + k, T_new.x), I::store(b.ty + k, T_new.y), I::store(b.tz + k, T_new.z);
+// Second half: the spring's advance and limit, dashpots, and what goes to each side.
+template <class I, SceneTraits scene, bool exact>
+PLATEN_INLINE void forces_of_pairs(Chunk<scene>& chunk, int at, const PairBatch& b, const LawConstants& c, std::int32_t k,
+                                   ChunkSums<I>& sums) {
+  static_assert(scene.rolling != Rolling::relative || !scene.equal_spheres, "relative rolling is built for unequal spheres only");
+  using Real = typename I::Real;
+  using Energy = PairEnergies<typename SingleOf<I>::Type>;
+  const PairsOfChunk<I, scene> pairs(chunk, at);
+  const Real zero = I::set(0.0);
+  const Vec3<I> none = {zero, zero, zero};
+  const auto touching = pairs.delta() > zero;
+  Real beta_n, k_t;
+  if constexpr (common_constants<scene>)
+    beta_n = I::set(c.beta_n), k_t = I::set(c.k_t);
+  else
+    beta_n = pairs.beta_n(), k_t = pairs.k_t();
+
+  // spring and its limit [Eq. 5, 9, 10]
+  const Vec3<I> T = sub_scaled<I>(pairs.turned(), k_t * I::set(c.dt), pairs.v_t());
+  const Real size2 = dot(T, T);
+  const Cut<I> cut = cut_to<I, exact>(pairs.limit(), size2);
+  const Vec3<I> T_new = where<I>(touching, scale<I>(cut.back, T), none);
   if constexpr (scene.energy) {
+    const Real loss = sliding_loss<I>(cut, size2, dot(pairs.turned(), T));
     if constexpr (scene.exponent == Exponent::one) {
-      sums.add(&Energy::sliding, I::where(touching, spring.loss, trial.was2) * I::set(c.half_over_k_t), c);
+      sums.add(&Energy::sliding, I::where(touching, loss, zero) * I::set(c.half_over_k_t), c);
     } else {
       // The spring's energy |T|^2/(2 k_t) also changes with k_t(delta): that part is no work of any force [A17].
-      const Real k_t_last = I::load(b.k_t_last + k), half = I::set(0.5);
+      const Vec3<I> T_old = {I::load(b.tx + k), I::load(b.ty + k), I::load(b.tz + k)};
+      const Real was2 = dot(T_old, T_old), k_t_last = I::load(b.k_t_last + k), half = I::set(0.5);
       const Real flexible_last = I::where(k_t_last > zero, half / k_t_last, zero);
       const Real flexible = I::where(touching, half / k_t, zero);
-      sums.add(&Energy::sliding, I::where(touching, spring.loss * flexible, trial.was2 * flexible_last), c);
-      sums.add(&Energy::model, I::where(touching, trial.was2 * (flexible - flexible_last), zero), c);
+      sums.add(&Energy::sliding, I::where(touching, loss * flexible, was2 * flexible_last), c);
+      sums.add(&Energy::model, I::where(touching, was2 * (flexible - flexible_last), zero), c);
       I::store(b.k_t_last + k, I::where(touching, k_t, zero));
     }
   }
+  I::store(b.tx + k, T_new.x), I::store(b.ty + k, T_new.y), I::store(b.tz + k, T_new.z);
 
   // F_t [Eq. 6, 7, A10]
   const Real beta_t = beta_n * I::set(c.beta_ratio);
   const Vec3<I> v_t = pairs.v_t();
-  const Vec3<I> F_t = sub_scaled<I>(spring.T, I::where(spring.cut, zero, beta_t), v_t);
+  const Vec3<I> F_t = sub_scaled<I>(T_new, I::where(cut.slides, zero, beta_t), v_t);
   if constexpr (scene.energy) {
     // A dashpot's work in a step is c v(n-1/2) v(n) dt; v(n) is not known yet. Summed by parts that is, to second
     // order, v(n-1/2)^2 (3/4 c(n) + 1/4 c(n-1)) dt: also in the step in which the spheres part [docs/laws.md, "Energy"].
@@ -102,7 +136,7 @@ PLATEN_INLINE void pair_forces(Chunk<scene>& chunk, int at, const PairBatch& b, 
     const auto was_touching = I::fma(v_n, I::set(c.dt), pairs.delta()) > zero;
     const Real now = I::set(0.75 * c.dt), before = I::set(0.25 * c.dt);
     const Real normal_share = I::where(touching, now, zero) + I::where(was_touching, before, zero);
-    const Real tangential_share = I::where(spring.cut, zero, normal_share);
+    const Real tangential_share = I::where(cut.slides, zero, normal_share);
     const Real viscous = (beta_n * normal_share) * (v_n * v_n) + (beta_t * tangential_share) * dot(v_t, v_t);
     sums.add(&Energy::viscous, I::where(I::either(touching, was_touching), viscous, zero), c);
   }
@@ -110,7 +144,7 @@ PLATEN_INLINE void pair_forces(Chunk<scene>& chunk, int at, const PairBatch& b, 
   // to each side: F, T = lever n x F_t; rolling [Eq. 11, A12-A14]
   // Masked last: padding has no distance, and what it computes is not a number.
   const Vec3<I> n = pairs.n();
-  const Vec3<I> F = where<I>(touching, add_scaled<I>(F_t, f_n, n), none);
+  const Vec3<I> F = where<I>(touching, add_scaled<I>(F_t, pairs.f_n(), n), none);
   chunk.template put<I>(chunk.F, at, F);
   const Vec3<I> turn = minus_cross(n, F_t);
   const Real lever_i = pairs.lever(0);
@@ -121,6 +155,7 @@ PLATEN_INLINE void pair_forces(Chunk<scene>& chunk, int at, const PairBatch& b, 
     if constexpr (scene.rolling == Rolling::relative) {
       const Real R_i = pairs.R(0), R_j = pairs.R(1);
       const Real inertia_i = I::set(0.4) * pairs.m(0) * (R_i * R_i), inertia_j = I::set(0.4) * pairs.m(1) * (R_j * R_j);
+      const Real strength = I::load(chunk.S[0] + at);
       const Vec3<I> torque = relative_rolling_torque<I, exact>(pairs.w(), I::set(c.mu_r) * strength, lever_i * R_i, lever_j * R_j,
                                                                inertia_i, inertia_j, c.rolling_share, c.dt);
       const Vec3<I> M = where<I>(touching, torque, none);
@@ -170,7 +205,9 @@ PLATEN_INLINE bool law_of_chunk(Chunk<scene>& chunk, const PairBatch& b, const L
                                 const ActiveVectors& active, PairTotals& totals) {
   ChunkSums<I> sums;
   for (int m = 0; m < active.count; ++m)
-    pair_forces<I, scene, exact>(chunk, active.at[m], b, c, start + active.at[m], sums);
+    springs_of_pairs<I, scene, exact>(chunk, active.at[m], b, c, start + active.at[m], sums);
+  for (int m = 0; m < active.count; ++m)
+    forces_of_pairs<I, scene, exact>(chunk, active.at[m], b, c, start + active.at[m], sums);
   using Sum = typename SingleOf<I>::Type;
   bool fine = true;
   if constexpr (scene.energy) {

@@ -62,10 +62,11 @@ struct Scalar {
   static PLATEN_INLINE double sum(Real a) { return a; }  // exact for order-free terms, whose order does not matter
   static PLATEN_INLINE double largest(Real a) { return a; }
 
-  // fields[k][lane] <- rows[index[lane]][k], k = 0..11: `width` rows of twelve doubles.
-  static PLATEN_INLINE void fetch_rows(const double* rows, const std::int32_t* index, Real (&fields)[12]) {
+  // fields[k][lane] <- rows[12 index[lane] + k], k = 0..n-1, n = 4, 8, 12: the first n numbers of `width` rows of twelve.
+  template <int n>
+  static PLATEN_INLINE void fetch_rows(const double* rows, const std::int32_t* index, Real (&fields)[n]) {
     const double* p = rows + 12 * static_cast<std::int64_t>(index[0]);
-    for (int k = 0; k < 12; ++k) fields[k] = p[k];
+    for (int k = 0; k < n; ++k) fields[k] = p[k];
   }
   // rows[index[0] + lane][first + k] <- fields[k][lane]
   static PLATEN_INLINE void scatter4(double* row, int first, const Real (&fields)[4]) {
@@ -158,13 +159,14 @@ struct Avx2 {
     c = _mm256_permute2f128_pd(ab_lo, cd_lo, 0x31);
     d = _mm256_permute2f128_pd(ab_hi, cd_hi, 0x31);
   }
-  static PLATEN_INLINE void fetch_rows(const double* rows, const std::int32_t* index, Real (&fields)[12]) {
-    __m256d part[3][4];
+  template <int n>
+  static PLATEN_INLINE void fetch_rows(const double* rows, const std::int32_t* index, Real (&fields)[n]) {
+    __m256d part[n / 4][4];
     for (int lane = 0; lane < 4; ++lane) {
       const double* p = rows + 12 * static_cast<std::int64_t>(index[lane]);
-      for (int k = 0; k < 3; ++k) part[k][lane] = _mm256_loadu_pd(p + 4 * k);
+      for (int k = 0; k < n / 4; ++k) part[k][lane] = _mm256_loadu_pd(p + 4 * k);
     }
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < n / 4; ++k) {
       transpose(part[k][0], part[k][1], part[k][2], part[k][3]);
       for (int m = 0; m < 4; ++m) fields[4 * k + m] = part[k][m];
     }
@@ -269,16 +271,17 @@ struct Avx512 {
   static PLATEN_INLINE double sum(Real a) { return _mm512_reduce_add_pd(a); }
   static PLATEN_INLINE double largest(Real a) { return _mm512_reduce_max_pd(a); }
 
-  static PLATEN_INLINE void fetch_rows(const double* rows, const std::int32_t* index, Real (&fields)[12]) {
-    __m512d part[3][4];
+  template <int n>
+  static PLATEN_INLINE void fetch_rows(const double* rows, const std::int32_t* index, Real (&fields)[n]) {
+    __m512d part[n / 4][4];
     for (int lane = 0; lane < 4; ++lane) {
       const double* p = rows + 12 * static_cast<std::int64_t>(index[lane]);
       const double* q = rows + 12 * static_cast<std::int64_t>(index[lane + 4]);
-      for (int k = 0; k < 3; ++k)
+      for (int k = 0; k < n / 4; ++k)
         part[k][lane] = _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(p + 4 * k)), _mm256_loadu_pd(q + 4 * k), 1);
     }
     const __m512i even = _mm512_set_epi64(13, 12, 5, 4, 9, 8, 1, 0), odd = _mm512_set_epi64(15, 14, 7, 6, 11, 10, 3, 2);
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < n / 4; ++k) {
       const __m512d ab_lo = _mm512_unpacklo_pd(part[k][0], part[k][1]), ab_hi = _mm512_unpackhi_pd(part[k][0], part[k][1]);
       const __m512d cd_lo = _mm512_unpacklo_pd(part[k][2], part[k][3]), cd_hi = _mm512_unpackhi_pd(part[k][2], part[k][3]);
       fields[4 * k + 0] = _mm512_permutex2var_pd(ab_lo, even, cd_lo);

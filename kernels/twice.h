@@ -9,22 +9,34 @@
 
 namespace platen {
 
+template <class T>
+struct Plain {
+  using Type = T;
+};
+template <class T>
+  requires requires { typename T::register_type; }
+struct Plain<T> {
+  using Type = typename T::register_type;
+};
+
 template <class I>
 struct Twice {
   using Half = I;
   struct Mask {
-    typename I::Mask a, b;
+    typename Plain<typename I::Mask>::Type a, b;
   };
+  using One = typename I::Real;
+  using Yes = typename I::Mask;
   struct Real {
-    typename I::Real a, b;
-    friend PLATEN_INLINE Real operator+(const Real& x, const Real& y) { return {x.a + y.a, x.b + y.b}; }
-    friend PLATEN_INLINE Real operator-(const Real& x, const Real& y) { return {x.a - y.a, x.b - y.b}; }
-    friend PLATEN_INLINE Real operator*(const Real& x, const Real& y) { return {x.a * y.a, x.b * y.b}; }
-    friend PLATEN_INLINE Real operator/(const Real& x, const Real& y) { return {x.a / y.a, x.b / y.b}; }
-    friend PLATEN_INLINE Real operator-(const Real& x) { return {-x.a, -x.b}; }
-    friend PLATEN_INLINE Mask operator<(const Real& x, const Real& y) { return {x.a < y.a, x.b < y.b}; }
-    friend PLATEN_INLINE Mask operator>(const Real& x, const Real& y) { return {x.a > y.a, x.b > y.b}; }
-    friend PLATEN_INLINE Mask operator>=(const Real& x, const Real& y) { return {x.a >= y.a, x.b >= y.b}; }
+    typename Plain<typename I::Real>::Type a, b;
+    friend PLATEN_INLINE Real operator+(const Real& x, const Real& y) { return {One(x.a) + One(y.a), One(x.b) + One(y.b)}; }
+    friend PLATEN_INLINE Real operator-(const Real& x, const Real& y) { return {One(x.a) - One(y.a), One(x.b) - One(y.b)}; }
+    friend PLATEN_INLINE Real operator*(const Real& x, const Real& y) { return {One(x.a) * One(y.a), One(x.b) * One(y.b)}; }
+    friend PLATEN_INLINE Real operator/(const Real& x, const Real& y) { return {One(x.a) / One(y.a), One(x.b) / One(y.b)}; }
+    friend PLATEN_INLINE Real operator-(const Real& x) { return {-One(x.a), -One(x.b)}; }
+    friend PLATEN_INLINE Mask operator<(const Real& x, const Real& y) { return {One(x.a) < One(y.a), One(x.b) < One(y.b)}; }
+    friend PLATEN_INLINE Mask operator>(const Real& x, const Real& y) { return {One(x.a) > One(y.a), One(x.b) > One(y.b)}; }
+    friend PLATEN_INLINE Mask operator>=(const Real& x, const Real& y) { return {One(x.a) >= One(y.a), One(x.b) >= One(y.b)}; }
   };
   using Record = typename I::Record;
   static constexpr int half = I::width;
@@ -62,7 +74,7 @@ struct Twice {
   static PLATEN_INLINE Real fast_inverse_sqrt(const Real& x) {
     return {I::fast_inverse_sqrt(x.a), I::fast_inverse_sqrt(x.b)};
   }
-  static PLATEN_INLINE double sum(const Real& x) { return I::sum(x.a + x.b); }
+  static PLATEN_INLINE double sum(const Real& x) { return I::sum(One(x.a) + One(x.b)); }
 
   static PLATEN_INLINE void fetch_rows(const double* rows, const std::int32_t* index, Real (&fields)[12]) {
     typename I::Real a[12], b[12];
@@ -95,7 +107,7 @@ struct SingleOf {
 template <class I>
 struct SingleOf<Twice<I>> {
   using Type = I;
-  static PLATEN_INLINE typename I::Real sum(const typename Twice<I>::Real& x) { return x.a + x.b; }
+  static PLATEN_INLINE typename I::Real sum(const typename Twice<I>::Real& x) { return typename I::Real(x.a) + typename I::Real(x.b); }
   static PLATEN_INLINE typename I::Real min(const typename Twice<I>::Real& x, const typename I::Real& y) {
     return I::min(x.a, I::min(x.b, y));
   }

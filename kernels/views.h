@@ -75,6 +75,7 @@ struct PairBatch {
   std::int32_t first;   // first particle of the batch
   std::int32_t count;
   std::int32_t end;     // one past the batch's last particle
+  double leap;          // bound of the change of any pair's distance in the last step [m]
   const double *x, *y, *z, *vx, *vy, *vz, *ux, *uy, *uz;  // the state itself, for the owner side
 };
 
@@ -144,6 +145,7 @@ struct MotionBatch {
 
 struct MotionTotals {
   double largest_pace = 0.0;     // of |v - mean|^2 / room^2 [1/s2]
+  double fastest = 0.0;          // |v - mean|, squared [m2/s2]
   double strongest = 0.0;        // largest force on a sphere, squared [N2]
   std::int64_t rolling = 0;      // rolling dissipation, quanta
   bool out_of_range = false;     // a velocity is not finite or absurd

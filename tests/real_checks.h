@@ -204,6 +204,10 @@ class RealChecks {
       I::fetch_rows(row, index, fields);
       for (int k = 0; k < 12; ++k)
         each("fetch_rows", fields[k], [&](int lane) { return 1000.0 + 12 * index[lane] + k; });
+      Real part_of_row[4];
+      I::fetch_rows(row + 8, index, part_of_row);
+      for (int k = 0; k < 4; ++k)
+        each("fetch_rows", part_of_row[k], [&](int lane) { return 1008.0 + 12 * index[lane] + k; });
 
       for (const int first : {0, 4, 8}) {
         alignas(64) double out[12 * W];

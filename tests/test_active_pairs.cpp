@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -14,9 +15,9 @@ namespace {
 
 using Two = Twice<Scalar>;
 constexpr SceneTraits scene{Exponent::any, true, true, Rolling::absolute, false, true};
-constexpr double dt = 1e-5;
+constexpr double leap = 2e-6;  // [m]
 
-// A chunk of pairs that are apart, with what is fetched and remembered numbered by pair.
+// A chunk of pairs that are apart, with their geometry and what is remembered numbered by pair.
 struct Sample {
   Chunk<scene> chunk{};
   std::vector<std::int32_t> i, j, slot_j;
@@ -27,21 +28,20 @@ struct Sample {
     for (int k = 0; k < chunk_size; ++k) {
       const auto at = static_cast<std::size_t>(k);
       i[at] = 100 + k / 3, j[at] = 1000 + k, slot_j[at] = 500 + k;
-      chunk.delta[k] = -1e-4, chunk.v_n[k] = 0.0;
-      for (int axis = 0; axis < 3; ++axis) chunk.n[axis][k] = 10 * k + axis, chunk.v_t[axis][k] = 10 * k + 3 + axis;
-      for (int side = 0; side < 2; ++side) chunk.lever[side][k] = 1 + k + 0.1 * side, chunk.R[side][k] = 2 + k + 0.1 * side, chunk.m[side][k] = 3 + k + 0.1 * side;
+      chunk.delta[k] = -1e-4, chunk.inverse[k] = 100.0 + k;
+      for (int axis = 0; axis < 3; ++axis) chunk.n[axis][k] = 10 * k + axis;
+      for (int side = 0; side < 2; ++side) chunk.R[side][k] = 2 + k + 0.1 * side;
     }
     batch.i = i.data(), batch.j = j.data(), batch.slot_j = slot_j.data();
     batch.sp = sp.data(), batch.tx = tx.data(), batch.ty = ty.data(), batch.tz = tz.data(), batch.k_t_last = k_t_last.data();
-    batch.first = 100, batch.count = chunk_size;
+    batch.first = 100, batch.count = chunk_size, batch.leap = leap;
   }
   ActiveVectors active() const {
-    Scalar::Real shortest = 1.0;
-    return active_vectors<Two, scene, false>(chunk, batch, dt, 0, chunk_size, shortest);
+    return active_vectors<Two, scene>(chunk, batch, chunk_size);
   }
 };
 
-TEST(ActivePairs, TouchingTouchedBeforeOrWithHistory) {
+TEST(ActivePairs, TouchingOrLessThanALeapApart) {
   EXPECT_EQ(Sample().active().count, 0);
   const auto only = [](const ActiveVectors& active, int pair) {
     return active.count == 1 && active.pairs == 1 && active.at[0] == pair / 2 * 2 && active.lanes[0] == 1u << pair % 2;
@@ -49,16 +49,13 @@ TEST(ActivePairs, TouchingTouchedBeforeOrWithHistory) {
   Sample touching;
   touching.chunk.delta[7] = 1e-9;
   EXPECT_TRUE(only(touching.active(), 7));
-  Sample parted;  // by less than it moved in the step
-  parted.chunk.v_n[12] = 2e-4 / dt;
+  Sample parted;  // by as much as any pair can have in the step
+  parted.chunk.delta[12] = -leap;
   EXPECT_TRUE(only(parted.active(), 12));
-  for (auto column : {&Sample::sp, &Sample::tx, &Sample::ty, &Sample::tz, &Sample::k_t_last}) {
-    Sample remembered;
-    (remembered.*column)[33] = -1e-12;
-    EXPECT_TRUE(only(remembered.active(), 33));
-  }
+  parted.chunk.delta[12] = std::nextafter(-leap, -1.0);
+  EXPECT_EQ(parted.active().count, 0);
   Sample broken;
-  broken.tx[4] = std::numeric_limits<double>::quiet_NaN();
+  broken.chunk.delta[4] = std::numeric_limits<double>::quiet_NaN();
   EXPECT_TRUE(only(broken.active(), 4));
 }
 
@@ -68,7 +65,7 @@ TEST(ActivePairs, AreGatheredWhereFew) {
   EXPECT_FALSE(Gathered::worth(s.active()));  // nothing there
   const std::vector<int> chosen = {3, 16, 17, 41, 62};
   for (const int k : chosen) s.chunk.delta[k] = 1e-6 * k;
-  s.chunk.delta[62] = -1e-4, s.k_t_last[62] = 5.0;  // apart, but remembered
+  s.chunk.delta[62] = -0.5 * leap, s.k_t_last[62] = 5.0;  // apart, but remembered
   ActiveVectors active = s.active();
   EXPECT_EQ(active.count, 4);
   EXPECT_EQ(active.pairs, 5);
@@ -89,16 +86,11 @@ TEST(ActivePairs, AreGatheredWhereFew) {
   for (int n = 0; n < 6; ++n) {
     const int k = kept[static_cast<std::size_t>(n)];
     EXPECT_EQ(s.chunk.delta[n], before.delta[k]);
-    for (int axis = 0; axis < 3; ++axis) {
-      EXPECT_EQ(s.chunk.n[axis][n], before.n[axis][k]);
-      EXPECT_EQ(s.chunk.v_t[axis][n], before.v_t[axis][k]);
-    }
-    for (int side = 0; side < 2; ++side) {
-      EXPECT_EQ(s.chunk.lever[side][n], before.lever[side][k]);
-      EXPECT_EQ(s.chunk.R[side][n], before.R[side][k]);
-      EXPECT_EQ(s.chunk.m[side][n], before.m[side][k]);
-    }
+    EXPECT_EQ(s.chunk.inverse[n], before.inverse[k]);
+    for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(s.chunk.n[axis][n], before.n[axis][k]);
+    for (int side = 0; side < 2; ++side) EXPECT_EQ(s.chunk.R[side][n], before.R[side][k]);
     EXPECT_EQ(view.i[n], 100 + k / 3);
+    EXPECT_EQ(view.j[n], 1000 + k);
     EXPECT_EQ(view.slot_j[n], 500 + k);
     EXPECT_EQ(view.sp[n], k + 0.5);
     EXPECT_EQ(view.ty[n], -k);
@@ -115,15 +107,14 @@ TEST(ActivePairs, AreGatheredWhereFew) {
 TEST(ActivePairs, AreFilledUpWithPairsThatAreApart) {
   Sample s;
   s.chunk.delta[20] = s.chunk.delta[40] = s.chunk.delta[60] = 1e-6;
-  s.chunk.v_n[60] = 1.0;
   ActiveVectors active = s.active();
   GatheredPairs<Two, scene> gathered;
   gathered.take(s.chunk, s.batch, 0, active);
   const PairBatch view = gathered.view(s.batch);
   ASSERT_EQ(active.count, 2);
   EXPECT_LT(s.chunk.delta[3], 0.0);
-  EXPECT_EQ(s.chunk.v_n[3], 0.0);
   EXPECT_EQ(view.i[3], view.i[2]);                  // the owner's sum goes on
+  EXPECT_EQ(view.j[3], view.i[3]);                  // a pair with itself, which has no distance and is masked
   EXPECT_EQ(view.slot_j[3], view.i[3] - 100);       // and nothing is added to it
   for (const double* column : {view.sp, view.tx, view.ty, view.tz, view.k_t_last}) EXPECT_EQ(column[3], 0.0);
 }

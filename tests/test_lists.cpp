@@ -1,7 +1,10 @@
 // No pair is missed, however fast spheres move: runs over lists against every pair looked at in every step.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <set>
+#include <utility>
 
 #include "tests/scenes.h"
 
@@ -202,6 +205,48 @@ TEST(AutomaticBatch, EvenWork) {
   EXPECT_FALSE(work_is_even(batches_with(1000, {6000, 0, 0}), 2));       // a free top: all pairs at one end
   EXPECT_FALSE(work_is_even(batches_with(1000, {3000, 3000, 2000, 2000}), 2));
   EXPECT_TRUE(work_is_even(batches_with(1000, {6000, 0, 0}), 1));
+}
+
+// The kernels pass over pairs that cannot have touched at the last step. Whoever parts forgets at once all the same, also
+// where few pairs touch and are drawn together; and a spring or a plastic overlap that stayed would show here.
+TEST(Lists, PairsThatPartedRememberNothing) {
+  for (const InstructionSet set : available_instruction_sets())
+    for (const int batch : {0, 64}) {
+      BedOptions o;
+      o.nx = o.ny = 6, o.nz = 7, o.spacing = 2.4, o.speed = 1.2;
+      EngineOptions engine;
+      engine.instruction_set = set, engine.batch = batch, engine.inner_gap = 0.3 * o.R;
+      PairLaw law = scenes::full_law();  // with a little plasticity and no cohesion, lest they stay together
+      law.k2 = 1.2 * law.k1, law.k_adh = law.f0 = 0.0, law.restitution = 0.9;
+      Simulation sim(scenes::bed(o, law, engine));
+      sim.set_time_step(5e-6);
+      std::size_t listed = 0, touching = 0, parted = 0;
+      std::set<std::pair<std::int32_t, std::int32_t>> before;
+      for (int step = 0; step < 1200; ++step) {
+        sim.advance(1);
+        std::set<std::pair<std::int32_t, std::int32_t>> now;
+        const Particles& p = sim.state();
+        for (const Batch& b : sim.batches())
+          for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k) {
+            const auto i = static_cast<std::size_t>(b.i[k]), j = static_cast<std::size_t>(b.j[k]);
+            const double dx = std::remainder(p.x[i] - p.x[j], o.nx * o.spacing * o.R);
+            const double dy = std::remainder(p.y[i] - p.y[j], o.ny * o.spacing * o.R), dz = p.z[i] - p.z[j];
+            const bool touches = dx * dx + dy * dy + dz * dz < 4.0 * o.R * o.R;
+            ++listed, touching += touches;
+            const std::pair<std::int32_t, std::int32_t> pair = std::minmax(p.rank[i], p.rank[j]);
+            if (touches) {
+              now.insert(pair);
+              continue;
+            }
+            parted += before.count(pair);
+            ASSERT_EQ(std::abs(b.sp[k]) + std::abs(b.tx[k]) + std::abs(b.ty[k]) + std::abs(b.tz[k]), 0.0)
+                << to_string(set) << ", batch " << batch << ", step " << step;
+          }
+        before = now;
+      }
+      EXPECT_GT(parted, 20u);
+      EXPECT_LT(touching * 4, listed) << "a dense bed: nothing is passed over";
+    }
 }
 
 }  // namespace
