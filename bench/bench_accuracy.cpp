@@ -124,6 +124,14 @@ void plot(const fs::path& folder, bool crush, const std::vector<std::string>& pa
     }
     if (!lines.empty())
       gp << fmt::format("set output 'work-{}.svg'\nset title '{}'\nset xlabel 'cost of a run (1e9 particle-steps)'\nset ylabel '|difference|'\nset yrange [0:*]\nplot {}{}\nset yrange [*:*]\n", q.key, q.name, lines, scatter);
+    // Coarser spheres save far more than any step and cost far more error: a plot of its own.
+    if (asked("scale")) {
+      const std::string points = rows("scale", "column(5) != 0 ? column(8) : NaN");
+      gp << fmt::format("set logscale x\nset output 'work-scale-{}.svg'\nset title '{}'\nset xlabel 'cost of a run (1e9 particle-steps)'\nset ylabel '|difference|'\nset yrange [0:*]\n"
+                        "plot {}:(abs(column(5))):(2*column(6)) skip 1 with yerrorbars title 'size of the spheres, twice the standard error', {}:(abs(column(5))):(sprintf('%g mm', 1e3*column(2))) skip 1 with labels offset 3,0.6 notitle, "
+                        "{}:7 skip 1 with lines lc 'grey' title 'scatter between seeds'\nset yrange [*:*]\nunset logscale\n",
+                        q.key, q.name, points, points, points);
+    }
   }
   if (asked("step"))
     gp << "set logscale y\nset format y '%.0e'\nset output 'energy.svg'\nset title 'energy ledger'\nset xlabel 'dt / dt_crit'\nset ylabel 'ledger residual / dissipated energy'\n"
