@@ -258,7 +258,7 @@ void Simulation::integrate(Batch& b, const MotionConstants& c) {
     p.image[2 * k] = p.image[2 * k + 1] = 0;
   }
   b.path += std::sqrt(totals.largest_pace) * c.drift;
-  b.fastest = std::sqrt(totals.fastest);
+  b.fastest = std::sqrt(totals.fastest2);
   b.rolling += totals.rolling;
   b.out_of_range = b.out_of_range || totals.out_of_range;
   // Pairs far faster than R omega give more than sums hold exactly before they overlap deeply: it shows in a sphere's sum.
@@ -286,14 +286,20 @@ bool Simulation::pairs_within(const Batch& b, double most) const {
   return true;
 }
 
+// Bound of the change of the distance of any pair of a batch in its last step [m]; with what rounding adds, of speeds and of
+// places up to 1e5 R from the origin.
+double Simulation::leap_of(const Batch& b, double dt) const {
+  double fastest = b.fastest;
+  for (const int partner : b.partners) fastest = std::max(fastest, batches_[static_cast<std::size_t>(partner)].fastest);
+  return (1.0 + 1e-9) * (b.fastest + fastest) * dt + 1e-9 * largest_radius_;
+}
+
 void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law, bool put_aside) {
   const auto index = static_cast<std::size_t>(&b - batches_.data());
   merged_[index] = 0;
   if (put_aside) saved_->batches[index].sums.swap(b.sum);
   std::memset(b.sum.data(), 0, b.sum.size() * sizeof(double));
-  double fastest = b.fastest;
-  for (const int partner : b.partners) fastest = std::max(fastest, batches_[static_cast<std::size_t>(partner)].fastest);
-  const double leap = (1.0 + 1e-9) * (b.fastest + fastest) * law.dt;  // more than rounding adds
+  const double leap = leap_of(b, law.dt);
   const PairBatch pairs{particles_.rows.data(), b.i.data(), b.j.data(), b.slot_j.data(), b.sp.data(), b.tx.data(),
                         b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum.data(), b.first, b.padded, b.first + b.count, leap,
                         particles_.x.data(), particles_.y.data(), particles_.z.data(), particles_.vx.data(),

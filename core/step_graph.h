@@ -18,7 +18,7 @@
 namespace platen {
 
 enum class TaskKind : std::uint8_t {
-  integrate,  // reads sums of b, halo slots meant for b, plate forces of b; writes x v u of b
+  integrate,  // reads sums of b, halo slots meant for b, plate forces of b; writes x v u of b and its largest speed
   contacts,   // reads x v u of b and its partners; writes history, sums and halo slots of b
   step        // fused: integrate, then contacts
 };

@@ -17,7 +17,7 @@ struct ActiveVectors {
 };
 
 // Which these are. No pair can have parted farther in the last step than `leap`, so one that is farther apart did not touch
-// then, and its history has been cleared since. A pair whose place is no number counts, and so
+// then, and its history was cleared in the step in which it parted. A pair whose place is no number counts, and so
 // does padding, which has no distance: law and output mask it.
 template <class I, SceneTraits scene>
 PLATEN_INLINE ActiveVectors active_vectors(const Chunk<scene>& chunk, const PairBatch& b, int count) {

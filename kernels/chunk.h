@@ -31,10 +31,10 @@ struct Chunk {
   alignas(64) Column R[2], m[2], w[3];
   alignas(64) Column turned[3];    // tangential spring, turned with the normal [N]
   alignas(64) Column limit, f_n;   // of the tangential force; normal force [N]
-  alignas(64) Column k_t, beta_n;  // of each pair: exponent other than 1, or unequal spheres
+  alignas(64) Column beta_n, k_t;  // of each pair: unequal spheres; exponent other than 1
   alignas(64) Column F[3];
   alignas(64) Column T[sides][3];
-  alignas(64) Column S[sides];
+  alignas(64) Column S[sides];     // |f_hys| lever; relative rolling: |f_hys|, for the second half of the law [N]
 
   template <class I>
   static PLATEN_INLINE void put(Column (&to)[3], int at, const Vec3<I>& a) {

@@ -8,7 +8,7 @@
 
 namespace platen {
 
-// Five loops over each chunk instead of one with everything in it: a processor looks a few hundred instructions ahead,
+// Five loops over each chunk, and the choice of pairs after the first, instead of one with everything in it: a processor looks a few hundred instructions ahead,
 // so only short bodies let the next contacts begin while the last ones wait for their results.
 template <class I, SceneTraits scene, bool exact, bool guarded = true>
 void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairTotals& totals) noexcept {
@@ -36,7 +36,7 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
     for (int m = 0; m < active.count; ++m)
       for (int at = active.at[m]; at < active.at[m] + Wide::width; at += I::width) {
         const auto lever = fetch_motion<I, scene>(chunk, at, seen, c, first + at);
-        // Padding, whose lever is no number, leaves the second operand as it is.
+        // Padding of the list, whose lever is no number, leaves the second operand as it is.
         if constexpr (guarded) shortest_lever = I::min(lever, shortest_lever);
       }
     fine = law_of_chunk<Wide, scene, exact, guarded>(chunk, seen, c, first, active, totals) && fine;

@@ -86,7 +86,7 @@ PLATEN_INLINE Vec3<I> turned_spring(const Vec3<I>& T_old, const Vec3<I>& n, cons
   using Real = typename I::Real;
   const Vec3<I> flat = sub_scaled<I>(T_old, dot(T_old, n), n);
   const Real product = was2 * dot(flat, flat);
-  // length/|flat| = length^2 / sqrt(length^2 |flat|^2); springs too small to square are left as they are.
+  // length/|flat| = length^2 / sqrt(length^2 |flat|^2); springs too small to square are not stretched.
   const Real tiny = I::set(0x1p-900);
   return scale<I>(I::where(product > tiny, was2 * inverse_sqrt<I, exact>(I::max(product, tiny)), I::set(1.0)), flat);
 }
@@ -99,14 +99,14 @@ struct Cut {
 };
 template <class I, bool exact>
 PLATEN_INLINE Cut<I> cut_to(const typename I::Real& limit, const typename I::Real& size2) {
-  // Also where both are 0 (no dashpot on a frictionless contact), and where a spring is no number: its loss is none then,
+  // Also where both are 0 (no dashpot on a frictionless contact), and where a spring is no number: its loss is no number then,
   // which the sum of energies shows.
   const auto slides = I::not_less(size2, limit * limit);
   return {slides, I::where(slides, limit * inverse_sqrt<I, exact>(I::max(size2, I::set(0x1p-900))), I::set(1.0))};
 }
 
-// 2 k_t times the energy that sliding takes where T, |T|^2 = size2, is cut to back T: the work of the mean of the old and
-// the new spring over the slip that did not stretch it, (T_old + T_new)(T - T_new), with along = T_old . T [N2].
+// 2 k_t times the energy that sliding takes where T, |T|^2 = size2, is cut to T_new = back T: the work of the mean of the
+// turned and the new spring over the slip that did not stretch it, (turned + T_new) . (T - T_new), with along = turned . T [N2].
 template <class I>
 PLATEN_INLINE typename I::Real sliding_loss(const Cut<I>& cut, const typename I::Real& size2, const typename I::Real& along) {
   return I::where(cut.slides, (I::set(1.0) - cut.back) * I::fma(cut.back, size2, along), I::set(0.0));

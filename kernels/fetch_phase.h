@@ -67,7 +67,7 @@ PLATEN_INLINE void fetch_geometry(Chunk<scene>& chunk, int at, const PairBatch& 
 template <class I, SceneTraits scene>
 PLATEN_INLINE typename I::Real fetch_motion(Chunk<scene>& chunk, int at, const PairBatch& b, const LawConstants& c, std::int32_t k) {
   using Real = typename I::Real;
-  RowPart<I> i[2];
+  RowPart<I> i[2];  // velocity and mass, spin and 1/R
   fetch_owners<I, scene>(b, 1, k, i);
   const RowPart<I> j[2] = {fetch_part<I>(b.rows, 1, b.j + k), fetch_part<I>(b.rows, 2, b.j + k)};
   const Vec3<I> n = chunk.template take<I>(chunk.n, at);

@@ -27,15 +27,17 @@ struct ChunkSums {
   }
 };
 
-// K1 is the same for all pairs of equal spheres with exponent 1, and so are the constants that follow from it.
+// With exponent 1, K1 and k_t are the same for all pairs, and among equal spheres so is beta_n.
 template <SceneTraits scene>
-inline constexpr bool common_constants = scene.exponent == Exponent::one && scene.equal_spheres;
+inline constexpr bool common_k_t = scene.exponent == Exponent::one;
+template <SceneTraits scene>
+inline constexpr bool common_beta_n = scene.exponent == Exponent::one && scene.equal_spheres;
 
 // First half of the law: of `width` pairs from position `at` of a chunk on, the normal force, what it limits, and the
 // tangential spring turned with the normal. Advances the plastic overlap and adds what that takes.
 //
 // Two halves, since each is one long chain of dependent operations with an inverse root in the middle: with both in one
-// loop a processor sees too few pairs at a time to fill the waits [docs/decisions.md, "The law in two halves"].
+// loop a processor sees too few pairs at a time to fill the waits [docs/decisions.md, "Fetch and law in two halves"].
 template <class I, SceneTraits scene, bool exact>
 PLATEN_INLINE void springs_of_pairs(Chunk<scene>& chunk, int at, const PairBatch& b, const LawConstants& c, std::int32_t k,
                                     ChunkSums<I>& sums) {
@@ -52,7 +54,7 @@ PLATEN_INLINE void springs_of_pairs(Chunk<scene>& chunk, int at, const PairBatch
   chunk.template put<I>(chunk.turned, at, turned_spring<I, exact>(T_old, pairs.n(), was2));
   if constexpr (scene.energy && scene.exponent == Exponent::one) {
     // Springs of pairs that have parted; few ever do.
-    if (I::any(I::both(was2 > zero, I::negate(touching))))
+    if (I::any(I::negate(I::either(touching, zero >= was2))))  // also one that is no number
       sums.add(&Energy::sliding, I::where(touching, zero, was2) * I::set(c.half_over_k_t), c);
   }
 
@@ -65,7 +67,7 @@ PLATEN_INLINE void springs_of_pairs(Chunk<scene>& chunk, int at, const PairBatch
     if constexpr (scene.energy) sums.add(&Energy::plastic, plastic_dissipation<I, scene.exponent>(sp_old, normal.sp, c), c);
   }
   Real beta_n;
-  if constexpr (common_constants<scene>) {
+  if constexpr (common_beta_n<scene>) {
     beta_n = I::set(c.beta_n);
   } else {
     static_assert(!scene.equal_spheres, "other exponents are built for unequal spheres only");
@@ -73,7 +75,7 @@ PLATEN_INLINE void springs_of_pairs(Chunk<scene>& chunk, int at, const PairBatch
     const Real K1 = loading_slope<I, scene.exponent>(I::where(touching, pairs.delta(), zero), c);
     beta_n = I::sqrt(I::set(c.damping) * m * K1);
     I::store(chunk.beta_n + at, beta_n);
-    I::store(chunk.k_t + at, I::set(c.ratio) * K1);
+    if constexpr (!common_k_t<scene>) I::store(chunk.k_t + at, I::set(c.ratio) * K1);
   }
   I::store(chunk.f_n + at, normal.f_hys - beta_n * pairs.v_n());
   I::store(chunk.limit + at, I::set(c.mu) * I::abs(normal.height));
@@ -97,11 +99,8 @@ PLATEN_INLINE void forces_of_pairs(Chunk<scene>& chunk, int at, const PairBatch&
   const Real zero = I::set(0.0);
   const Vec3<I> none = {zero, zero, zero};
   const auto touching = pairs.delta() > zero;
-  Real beta_n, k_t;
-  if constexpr (common_constants<scene>)
-    beta_n = I::set(c.beta_n), k_t = I::set(c.k_t);
-  else
-    beta_n = pairs.beta_n(), k_t = pairs.k_t();
+  const Real beta_n = common_beta_n<scene> ? I::set(c.beta_n) : pairs.beta_n();
+  const Real k_t = common_k_t<scene> ? I::set(c.k_t) : pairs.k_t();
 
   // spring and its limit [Eq. 5, 9, 10]
   const Vec3<I> T = sub_scaled<I>(pairs.turned(), k_t * I::set(c.dt), pairs.v_t());

@@ -14,7 +14,7 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
   using Real = typename I::Real;
   const Real zero = I::set(0.0), kick = I::set(c.kick), drift = I::set(c.drift);
   Real largest = zero;
-  Real fastest = zero;
+  Real fastest = zero;    // speed, squared
   Real rolled = zero;
   Real squares = zero;    // of all velocities: not a number where one is none. Spins show in the contacts that they rub
   Real strongest = zero;  // largest force on a sphere, squared
@@ -84,7 +84,7 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
   }
   const double pace = I::largest(largest);
   totals.largest_pace = totals.largest_pace > pace ? totals.largest_pace : pace;
-  totals.fastest = I::largest(fastest);
+  totals.fastest2 = I::largest(fastest);
   if constexpr (guarded) totals.out_of_range = totals.out_of_range || I::any(I::not_less(squares, I::set(0x1p60)));
   if constexpr (guarded) totals.strongest = I::largest(strongest);
   if constexpr (energy && rolling) {

@@ -62,7 +62,7 @@ struct Scalar {
   static PLATEN_INLINE double sum(Real a) { return a; }  // exact for order-free terms, whose order does not matter
   static PLATEN_INLINE double largest(Real a) { return a; }
 
-  // fields[k][lane] <- rows[12 index[lane] + k], k = 0..n-1, n = 4, 8, 12: the first n numbers of `width` rows of twelve.
+  // fields[k][lane] <- rows[12 index[lane] + k], k = 0..n-1: n (a multiple of 4) numbers of `width` rows of twelve from `rows` on.
   template <int n>
   static PLATEN_INLINE void fetch_rows(const double* rows, const std::int32_t* index, Real (&fields)[n]) {
     const double* p = rows + 12 * static_cast<std::int64_t>(index[0]);

@@ -1,6 +1,6 @@
 // Two vectors worked on side by side: the same names as an instruction set of real.h, twice as wide.
 //
-// A contact is one long chain of dependent operations (distance, three inverse roots, the limit of friction), so that a
+// A contact is one long chain of dependent operations (an inverse root, the limit of friction, forces), so that a
 // loop over single vectors waits for results most of the time. Two independent chains, operation by operation in turn,
 // fill these waits. Each half does what it would do alone, so no bit changes.
 #pragma once
@@ -9,6 +9,7 @@
 
 namespace platen {
 
+// The bare register of a batch of numbers or of flags. g++ 12 copies structures of xsimd's classes through the stack.
 template <class T>
 struct Plain {
   using Type = T;
@@ -21,12 +22,10 @@ struct Plain<T> {
 
 template <class I>
 struct Twice {
-  using Half = I;
   struct Mask {
     typename Plain<typename I::Mask>::Type a, b;
   };
   using One = typename I::Real;
-  using Yes = typename I::Mask;
   struct Real {
     typename Plain<typename I::Real>::Type a, b;
     friend PLATEN_INLINE Real operator+(const Real& x, const Real& y) { return {One(x.a) + One(y.a), One(x.b) + One(y.b)}; }
@@ -113,7 +112,7 @@ struct SingleOf<Twice<I>> {
   }
 };
 
-// What the law runs on. AVX2 has too few registers for two vectors at once [docs/decisions.md].
+// What the law runs on. AVX2 has too few registers for two vectors at once [docs/decisions.md, "What did not help the contact kernel"].
 template <class I>
 struct Interleaved {
   using Type = I;

@@ -145,7 +145,7 @@ struct MotionBatch {
 
 struct MotionTotals {
   double largest_pace = 0.0;     // of |v - mean|^2 / room^2 [1/s2]
-  double fastest = 0.0;          // |v - mean|, squared [m2/s2]
+  double fastest2 = 0.0;         // largest |v - mean|^2 [m2/s2]
   double strongest = 0.0;        // largest force on a sphere, squared [N2]
   std::int64_t rolling = 0;      // rolling dissipation, quanta
   bool out_of_range = false;     // a velocity is not finite or absurd

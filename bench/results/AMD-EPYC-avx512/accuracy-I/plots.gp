@@ -29,6 +29,11 @@ set title 'strain at the end of compression'
 set xlabel 'plate speed (m/s)'
 set ylabel 'difference'
 plot 'bulk.csv' using (strcol(1) eq 'speed' && strcol(4) eq 'strain' ? column(2) : NaN):5:6 skip 1 with yerrorlines title 'difference to the reference, standard error', 'bulk.csv' using (strcol(1) eq 'speed' && strcol(4) eq 'strain' ? column(2) : NaN):7 skip 1 with lines lc 'grey' title 'scatter between seeds', 'bulk.csv' using (strcol(1) eq 'speed' && strcol(4) eq 'strain' ? column(2) : NaN):(-column(7)) skip 1 with lines lc 'grey' notitle
+set output 'bulk-scale-strain.svg'
+set title 'strain at the end of compression'
+set xlabel 'R (m)'
+set ylabel 'difference'
+plot 'bulk.csv' using (strcol(1) eq 'scale' && strcol(4) eq 'strain' ? column(2) : NaN):5:6 skip 1 with yerrorlines title 'difference to the reference, standard error', 'bulk.csv' using (strcol(1) eq 'scale' && strcol(4) eq 'strain' ? column(2) : NaN):7 skip 1 with lines lc 'grey' title 'scatter between seeds', 'bulk.csv' using (strcol(1) eq 'scale' && strcol(4) eq 'strain' ? column(2) : NaN):(-column(7)) skip 1 with lines lc 'grey' notitle
 set output 'work-strain.svg'
 set title 'strain at the end of compression'
 set xlabel 'cost of a run (1e9 particle-steps)'
@@ -36,6 +41,15 @@ set ylabel '|difference|'
 set yrange [0:*]
 plot 'bulk.csv' using (strcol(1) eq 'step' && strcol(4) eq 'strain' ? column(5) != 0 ? column(8) : NaN : NaN):(abs(column(5))):(2*column(6)) skip 1 with yerrorbars title 'fixed step, twice the standard error', 'bulk.csv' using (strcol(1) eq 'auto' && strcol(4) eq 'strain' ? column(5) != 0 ? column(8) : NaN : NaN):(abs(column(5))):(2*column(6)) skip 1 with yerrorbars title 'automatic step, twice the standard error', 'bulk.csv' using (strcol(1) eq 'speed' && strcol(4) eq 'strain' ? column(5) != 0 ? column(8) : NaN : NaN):(abs(column(5))):(2*column(6)) skip 1 with yerrorbars title 'plate speed, twice the standard error', 'bulk.csv' using (strcol(1) eq 'step' && strcol(4) eq 'strain' ? column(5) != 0 ? column(8) : NaN : NaN):7 skip 1 with lines lc 'grey' title 'scatter between seeds', 'bulk.csv' using (strcol(1) eq 'step' && strcol(4) eq 'strain' ? column(5) != 0 ? column(8) : NaN : NaN):(column(7)/2) skip 1 with lines dashtype 2 lc 'grey' title 'half of it'
 set yrange [*:*]
+set logscale x
+set output 'work-scale-strain.svg'
+set title 'strain at the end of compression'
+set xlabel 'cost of a run (1e9 particle-steps)'
+set ylabel '|difference|'
+set yrange [0:*]
+plot 'bulk.csv' using (strcol(1) eq 'scale' && strcol(4) eq 'strain' ? column(5) != 0 ? column(8) : NaN : NaN):(abs(column(5))):(2*column(6)) skip 1 with yerrorbars title 'size of the spheres, twice the standard error', 'bulk.csv' using (strcol(1) eq 'scale' && strcol(4) eq 'strain' ? column(5) != 0 ? column(8) : NaN : NaN):(abs(column(5))):(sprintf('%g mm', 1e3*column(2))) skip 1 with labels offset 3,0.6 notitle, 'bulk.csv' using (strcol(1) eq 'scale' && strcol(4) eq 'strain' ? column(5) != 0 ? column(8) : NaN : NaN):7 skip 1 with lines lc 'grey' title 'scatter between seeds'
+set yrange [*:*]
+unset logscale
 set format y '%g'
 set output 'bulk-step-porosity.svg'
 set title 'porosity there'
@@ -52,6 +66,11 @@ set title 'porosity there'
 set xlabel 'plate speed (m/s)'
 set ylabel 'difference'
 plot 'bulk.csv' using (strcol(1) eq 'speed' && strcol(4) eq 'porosity' ? column(2) : NaN):5:6 skip 1 with yerrorlines title 'difference to the reference, standard error', 'bulk.csv' using (strcol(1) eq 'speed' && strcol(4) eq 'porosity' ? column(2) : NaN):7 skip 1 with lines lc 'grey' title 'scatter between seeds', 'bulk.csv' using (strcol(1) eq 'speed' && strcol(4) eq 'porosity' ? column(2) : NaN):(-column(7)) skip 1 with lines lc 'grey' notitle
+set output 'bulk-scale-porosity.svg'
+set title 'porosity there'
+set xlabel 'R (m)'
+set ylabel 'difference'
+plot 'bulk.csv' using (strcol(1) eq 'scale' && strcol(4) eq 'porosity' ? column(2) : NaN):5:6 skip 1 with yerrorlines title 'difference to the reference, standard error', 'bulk.csv' using (strcol(1) eq 'scale' && strcol(4) eq 'porosity' ? column(2) : NaN):7 skip 1 with lines lc 'grey' title 'scatter between seeds', 'bulk.csv' using (strcol(1) eq 'scale' && strcol(4) eq 'porosity' ? column(2) : NaN):(-column(7)) skip 1 with lines lc 'grey' notitle
 set output 'work-porosity.svg'
 set title 'porosity there'
 set xlabel 'cost of a run (1e9 particle-steps)'
@@ -59,6 +78,15 @@ set ylabel '|difference|'
 set yrange [0:*]
 plot 'bulk.csv' using (strcol(1) eq 'step' && strcol(4) eq 'porosity' ? column(5) != 0 ? column(8) : NaN : NaN):(abs(column(5))):(2*column(6)) skip 1 with yerrorbars title 'fixed step, twice the standard error', 'bulk.csv' using (strcol(1) eq 'auto' && strcol(4) eq 'porosity' ? column(5) != 0 ? column(8) : NaN : NaN):(abs(column(5))):(2*column(6)) skip 1 with yerrorbars title 'automatic step, twice the standard error', 'bulk.csv' using (strcol(1) eq 'speed' && strcol(4) eq 'porosity' ? column(5) != 0 ? column(8) : NaN : NaN):(abs(column(5))):(2*column(6)) skip 1 with yerrorbars title 'plate speed, twice the standard error', 'bulk.csv' using (strcol(1) eq 'step' && strcol(4) eq 'porosity' ? column(5) != 0 ? column(8) : NaN : NaN):7 skip 1 with lines lc 'grey' title 'scatter between seeds', 'bulk.csv' using (strcol(1) eq 'step' && strcol(4) eq 'porosity' ? column(5) != 0 ? column(8) : NaN : NaN):(column(7)/2) skip 1 with lines dashtype 2 lc 'grey' title 'half of it'
 set yrange [*:*]
+set logscale x
+set output 'work-scale-porosity.svg'
+set title 'porosity there'
+set xlabel 'cost of a run (1e9 particle-steps)'
+set ylabel '|difference|'
+set yrange [0:*]
+plot 'bulk.csv' using (strcol(1) eq 'scale' && strcol(4) eq 'porosity' ? column(5) != 0 ? column(8) : NaN : NaN):(abs(column(5))):(2*column(6)) skip 1 with yerrorbars title 'size of the spheres, twice the standard error', 'bulk.csv' using (strcol(1) eq 'scale' && strcol(4) eq 'porosity' ? column(5) != 0 ? column(8) : NaN : NaN):(abs(column(5))):(sprintf('%g mm', 1e3*column(2))) skip 1 with labels offset 3,0.6 notitle, 'bulk.csv' using (strcol(1) eq 'scale' && strcol(4) eq 'porosity' ? column(5) != 0 ? column(8) : NaN : NaN):7 skip 1 with lines lc 'grey' title 'scatter between seeds'
+set yrange [*:*]
+unset logscale
 set format y '%g'
 set output 'bulk-step-coordination_number.svg'
 set title 'coordination number there'
@@ -75,6 +103,11 @@ set title 'coordination number there'
 set xlabel 'plate speed (m/s)'
 set ylabel 'difference'
 plot 'bulk.csv' using (strcol(1) eq 'speed' && strcol(4) eq 'coordination_number' ? column(2) : NaN):5:6 skip 1 with yerrorlines title 'difference to the reference, standard error', 'bulk.csv' using (strcol(1) eq 'speed' && strcol(4) eq 'coordination_number' ? column(2) : NaN):7 skip 1 with lines lc 'grey' title 'scatter between seeds', 'bulk.csv' using (strcol(1) eq 'speed' && strcol(4) eq 'coordination_number' ? column(2) : NaN):(-column(7)) skip 1 with lines lc 'grey' notitle
+set output 'bulk-scale-coordination_number.svg'
+set title 'coordination number there'
+set xlabel 'R (m)'
+set ylabel 'difference'
+plot 'bulk.csv' using (strcol(1) eq 'scale' && strcol(4) eq 'coordination_number' ? column(2) : NaN):5:6 skip 1 with yerrorlines title 'difference to the reference, standard error', 'bulk.csv' using (strcol(1) eq 'scale' && strcol(4) eq 'coordination_number' ? column(2) : NaN):7 skip 1 with lines lc 'grey' title 'scatter between seeds', 'bulk.csv' using (strcol(1) eq 'scale' && strcol(4) eq 'coordination_number' ? column(2) : NaN):(-column(7)) skip 1 with lines lc 'grey' notitle
 set output 'work-coordination_number.svg'
 set title 'coordination number there'
 set xlabel 'cost of a run (1e9 particle-steps)'
@@ -82,6 +115,15 @@ set ylabel '|difference|'
 set yrange [0:*]
 plot 'bulk.csv' using (strcol(1) eq 'step' && strcol(4) eq 'coordination_number' ? column(5) != 0 ? column(8) : NaN : NaN):(abs(column(5))):(2*column(6)) skip 1 with yerrorbars title 'fixed step, twice the standard error', 'bulk.csv' using (strcol(1) eq 'auto' && strcol(4) eq 'coordination_number' ? column(5) != 0 ? column(8) : NaN : NaN):(abs(column(5))):(2*column(6)) skip 1 with yerrorbars title 'automatic step, twice the standard error', 'bulk.csv' using (strcol(1) eq 'speed' && strcol(4) eq 'coordination_number' ? column(5) != 0 ? column(8) : NaN : NaN):(abs(column(5))):(2*column(6)) skip 1 with yerrorbars title 'plate speed, twice the standard error', 'bulk.csv' using (strcol(1) eq 'step' && strcol(4) eq 'coordination_number' ? column(5) != 0 ? column(8) : NaN : NaN):7 skip 1 with lines lc 'grey' title 'scatter between seeds', 'bulk.csv' using (strcol(1) eq 'step' && strcol(4) eq 'coordination_number' ? column(5) != 0 ? column(8) : NaN : NaN):(column(7)/2) skip 1 with lines dashtype 2 lc 'grey' title 'half of it'
 set yrange [*:*]
+set logscale x
+set output 'work-scale-coordination_number.svg'
+set title 'coordination number there'
+set xlabel 'cost of a run (1e9 particle-steps)'
+set ylabel '|difference|'
+set yrange [0:*]
+plot 'bulk.csv' using (strcol(1) eq 'scale' && strcol(4) eq 'coordination_number' ? column(5) != 0 ? column(8) : NaN : NaN):(abs(column(5))):(2*column(6)) skip 1 with yerrorbars title 'size of the spheres, twice the standard error', 'bulk.csv' using (strcol(1) eq 'scale' && strcol(4) eq 'coordination_number' ? column(5) != 0 ? column(8) : NaN : NaN):(abs(column(5))):(sprintf('%g mm', 1e3*column(2))) skip 1 with labels offset 3,0.6 notitle, 'bulk.csv' using (strcol(1) eq 'scale' && strcol(4) eq 'coordination_number' ? column(5) != 0 ? column(8) : NaN : NaN):7 skip 1 with lines lc 'grey' title 'scatter between seeds'
+set yrange [*:*]
+unset logscale
 set logscale y
 set format y '%.0e'
 set output 'energy.svg'
