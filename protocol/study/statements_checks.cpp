@@ -124,6 +124,17 @@ void judge_quasi_static(Judge& judge, const StudyPlan& plan) {
   }
 }
 
+// The unscaled bed of a size: the plain one; where none is planned, one with keys of its own, as gravity scaled with the stiffness.
+const MeasuredCurve* unscaled_bed(const Judge& judge, double R) {
+  const MeasuredCurve* special = nullptr;
+  for (const MeasuredCurve& curve : judge.part().curves) {
+    if (curve.planned->radius != R || curve.planned->powers.stiffness != 0.0) continue;
+    if (judge.is_plain(curve)) return judge.scaled(R, 0.0, std::nullopt);
+    if (special == nullptr && !curve.runs.empty()) special = &curve;
+  }
+  return special;
+}
+
 void judge_similarity_2(Judge& judge) {
   const Case& base = judge.part().plan->base;
   double zero = judge.part().plan->study->strain_zero.value_or(no_value);
@@ -132,7 +143,7 @@ void judge_similarity_2(Judge& judge) {
   for (const double R : judge.radii()) {
     const double lambda = R / judge.part().plan->reference_radius;
     const MeasuredCurve* scaled = judge.scaled(R, 1.0, std::nullopt);
-    const MeasuredCurve* unscaled = judge.scaled(R, 0.0, std::nullopt);
+    const MeasuredCurve* unscaled = unscaled_bed(judge, R);
     const std::string text = fmt::format(
         "{}: the unscaled bed at a stress has the strain of the scaled bed at {:g} times the "
         "stress, RMS distance below the scatter over seeds",
