@@ -141,7 +141,7 @@ class Simulation {
   const PlateConstants& plate_law() const { return plate_law_; }
   void rebuild_now();
   void ensure_forces();
-  double leap_of(const Batch& batch, double dt) const;
+  double leap_of(const Batch& batch, double dt) const;  // [m], bound of what a pair's distance changes in the last step
 
  private:
   struct Saved;

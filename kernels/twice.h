@@ -37,11 +37,8 @@ struct Twice {
     friend PLATEN_INLINE Mask operator>(const Real& x, const Real& y) { return {One(x.a) > One(y.a), One(x.b) > One(y.b)}; }
     friend PLATEN_INLINE Mask operator>=(const Real& x, const Real& y) { return {One(x.a) >= One(y.a), One(x.b) >= One(y.b)}; }
   };
-  using Record = typename I::Record;
   static constexpr int half = I::width;
   static constexpr int width = 2 * half;
-  static constexpr bool picks = I::picks;
-  static constexpr const char* name = I::name;
 
   static PLATEN_INLINE Real set(double x) { return {I::set(x), I::set(x)}; }
   static PLATEN_INLINE Real load(const double* p) { return {I::load(p), I::load(p + half)}; }
@@ -74,25 +71,6 @@ struct Twice {
     return {I::fast_inverse_sqrt(x.a), I::fast_inverse_sqrt(x.b)};
   }
   static PLATEN_INLINE double sum(const Real& x) { return I::sum(One(x.a) + One(x.b)); }
-
-  static PLATEN_INLINE void fetch_rows(const double* rows, const std::int32_t* index, Real (&fields)[12]) {
-    typename I::Real a[12], b[12];
-    I::fetch_rows(rows, index, a);
-    I::fetch_rows(rows, index + half, b);
-    for (int k = 0; k < 12; ++k) fields[k] = {a[k], b[k]};
-  }
-  static PLATEN_INLINE void to_records(const Real (&fields)[8], Record (&records)[width]) {
-    typename I::Real a[8], b[8];
-    for (int k = 0; k < 8; ++k) a[k] = fields[k].a, b[k] = fields[k].b;
-    Record first[half], second[half];
-    I::to_records(a, first);
-    I::to_records(b, second);
-    for (int k = 0; k < half; ++k) records[k] = first[k], records[k + half] = second[k];
-  }
-  static PLATEN_INLINE Record zero_record() { return I::zero_record(); }
-  static PLATEN_INLINE Record load_record(const double* p) { return I::load_record(p); }
-  static PLATEN_INLINE void store_record(double* p, const Record& r) { I::store_record(p, r); }
-  static PLATEN_INLINE Record add(const Record& a, const Record& b) { return I::add(a, b); }
 };
 
 // What sums over vectors of I are kept in: single vectors, which take half the registers.
@@ -100,16 +78,11 @@ template <class I>
 struct SingleOf {
   using Type = I;
   static PLATEN_INLINE typename I::Real sum(const typename I::Real& x) { return x; }
-  // The second operand where the first is not a number.
-  static PLATEN_INLINE typename I::Real min(const typename I::Real& x, const typename I::Real& y) { return I::min(x, y); }
 };
 template <class I>
 struct SingleOf<Twice<I>> {
   using Type = I;
   static PLATEN_INLINE typename I::Real sum(const typename Twice<I>::Real& x) { return typename I::Real(x.a) + typename I::Real(x.b); }
-  static PLATEN_INLINE typename I::Real min(const typename Twice<I>::Real& x, const typename I::Real& y) {
-    return I::min(x.a, I::min(x.b, y));
-  }
 };
 
 // What the law runs on. AVX2 has too few registers for two vectors at once [docs/decisions.md, "What did not help the contact kernel"].
