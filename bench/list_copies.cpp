@@ -29,8 +29,10 @@ PlateBatch PlateCopy::view(const StateCopy& state) {
 
 BatchCopy::BatchCopy(const Batch& b)
     : i(copy_of(b.i)),
-      j(copy_of(b.j)),
-      slot_j(copy_of(b.slot_j)),
+      row_j(copy_of(b.row_j)),
+      to_j(copy_of(b.to_j)),
+      to_last(copy_of(b.to_last)),
+      again(copy_of(b.again)),
       sp(copy_of(b.sp)),
       tx(copy_of(b.tx)),
       ty(copy_of(b.ty)),
@@ -60,11 +62,12 @@ BatchCopy::BatchCopy(const Batch& b)
 PairBatch BatchCopy::pairs(const StateCopy& state) {
   PairBatch b{};
   b.rows = state.rows.data();
-  b.i = i.data(), b.j = j.data(), b.slot_j = slot_j.data();
+  b.i = i.data(), b.row_j = row_j.data(), b.to_j = to_j.data(), b.to_last = to_last.data(), b.again = again.data();
   b.sp = sp.data(), b.tx = tx.data(), b.ty = ty.data(), b.tz = tz.data();
   b.k_t_last = k_t_last.empty() ? nullptr : k_t_last.data();
   b.sum = sum.data();
   b.first = first, b.count = padded, b.end = first + count;
+  b.spare = static_cast<std::int32_t>(sum.size()) - spare_records * record_size;
   b.leap = std::numeric_limits<double>::infinity();  // every listed pair goes through the law
   b.x = state.x.data(), b.y = state.y.data(), b.z = state.z.data();
   b.vx = state.vx.data(), b.vy = state.vy.data(), b.vz = state.vz.data();
@@ -98,12 +101,13 @@ MotionBatch BatchCopy::motion(StateCopy& s) {
 std::int64_t BatchCopy::list_bytes() const {
   const std::int64_t history = k_t_last.empty() ? 4 : 5;
   return padded *
-         static_cast<std::int64_t>(3 * sizeof(std::int32_t) + 2 * sizeof(double) * static_cast<std::size_t>(history));
+         static_cast<std::int64_t>(4 * sizeof(std::int32_t) + sizeof(std::uint8_t) + 2 * sizeof(double) * static_cast<std::size_t>(history));
 }
 
 std::int64_t BatchCopy::row_bytes() const {
-  std::vector<std::int32_t> spheres(i.begin(), i.end());
-  spheres.insert(spheres.end(), j.begin(), j.end());
+  std::vector<std::int32_t> spheres;
+  for (const std::int32_t k : i) spheres.push_back(row_size * k);
+  spheres.insert(spheres.end(), row_j.begin(), row_j.end());
   std::sort(spheres.begin(), spheres.end());
   const auto distinct = std::unique(spheres.begin(), spheres.end()) - spheres.begin();
   return distinct * static_cast<std::int64_t>(row_size * sizeof(double));

@@ -32,7 +32,8 @@ struct PlateCopy {
 
 struct BatchCopy {
   explicit BatchCopy(const Batch& b);
-  AlignedArray<std::int32_t> i, j, slot_j;
+  AlignedArray<std::int32_t> i, row_j, to_j, to_last;
+  AlignedArray<std::uint8_t> again;
   AlignedArray<double> sp, tx, ty, tz, k_t_last, sum;
   std::vector<double> inverse_room2;  // none: nothing is watched
   std::int32_t first = 0, count = 0, used = 0, padded = 0;

@@ -3,7 +3,7 @@
 //   particles   ... | first ............ first+count | ...      whole vectors
 //   outer list  pairs of own particles within R_i + R_j + margins, by owner; lives from rebuild to rebuild
 //   inner list  those of them within smaller margins, with the history; all that the contact kernel sees
-//   sums        [ own particles | halo slots ]           halo slot: one per foreign partner, written by this batch only,
+//   sums        [ own particles | halo slots | spare ]   halo slot: one per foreign partner, written by this batch only,
 //                                                         read by the partner's batch through `incoming`
 //
 // A pair across two batches belongs to the batch of the lower colour; neighbouring batches never share a colour.
@@ -39,7 +39,10 @@ struct Batch {
   std::vector<std::int32_t> outer_i, outer_j;
 
   std::int32_t used = 0, padded = 0;  // pairs of the inner list
-  AlignedArray<std::int32_t> i, j, slot_j, from;  // from: place in the outer list
+  AlignedArray<std::int32_t> i, row_j, to_j, to_last;  // kernels/views.h
+  AlignedArray<std::uint8_t> again;
+  AlignedArray<std::int32_t> from;                     // place in the outer list
+  std::int32_t j(std::size_t k) const { return row_j[k] / row_size; }
   AlignedArray<double> sp, tx, ty, tz, k_t_last;
 
   AlignedArray<double> sum;           // records

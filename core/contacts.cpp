@@ -6,6 +6,8 @@
 #include <string>
 #include <tuple>
 
+#include "kernels/owner_runs.h"
+
 namespace platen {
 
 namespace {
@@ -49,7 +51,8 @@ void install(Batch& batch, Inner& inner, const Particles& p) {
   batch.used = static_cast<std::int32_t>(inner.from.size());
   batch.padded = static_cast<std::int32_t>(inner.padded());
   const auto size = inner.padded();
-  for (auto* column : {&batch.i, &batch.j, &batch.slot_j, &batch.from}) column->assign(size, 0);
+  for (auto* column : {&batch.i, &batch.row_j, &batch.to_j, &batch.to_last, &batch.from}) column->assign(size, 0);
+  batch.again.assign(size, 0);
   batch.sp.swap(inner.sp), batch.tx.swap(inner.tx), batch.ty.swap(inner.ty), batch.tz.swap(inner.tz);
   batch.k_t_last.swap(inner.k_t);
 
@@ -60,8 +63,8 @@ void install(Batch& batch, Inner& inner, const Particles& p) {
     const std::int32_t j = batch.outer_j[m], local = j - batch.first;
     batch.from[k] = inner.from[k];
     batch.i[k] = batch.outer_i[m];
-    batch.j[k] = j;
-    batch.slot_j[k] = local;
+    batch.row_j[k] = row_size * j;
+    batch.to_j[k] = record_size * local;
     if (local >= 0 && local < batch.count) continue;
     std::int32_t& slot = inner.slot_of[static_cast<std::size_t>(j)];
     if (slot < 0) slot = 0, batch.halo.push_back(j);
@@ -70,16 +73,19 @@ void install(Batch& batch, Inner& inner, const Particles& p) {
   for (std::size_t k = 0; k < batch.halo.size(); ++k)
     inner.slot_of[static_cast<std::size_t>(batch.halo[k])] = batch.count + static_cast<std::int32_t>(k);
   for (std::size_t k = 0; k < inner.from.size(); ++k)
-    if (const std::int32_t slot = inner.slot_of[static_cast<std::size_t>(batch.j[k])]; slot >= 0) batch.slot_j[k] = slot;
+    if (const std::int32_t slot = inner.slot_of[static_cast<std::size_t>(batch.j(k))]; slot >= 0) batch.to_j[k] = record_size * slot;
   for (const std::int32_t particle : batch.halo) inner.slot_of[static_cast<std::size_t>(particle)] = -1;
   for (std::size_t k = inner.from.size(); k < size; ++k) {  // harmless repetitions: i with itself
-    batch.i[k] = batch.j[k] = batch.used > 0 ? batch.i[static_cast<std::size_t>(batch.used) - 1] : batch.first;
-    batch.slot_j[k] = batch.i[k] - batch.first;
+    batch.i[k] = batch.used > 0 ? batch.i[static_cast<std::size_t>(batch.used) - 1] : batch.first;
+    batch.row_j[k] = row_size * batch.i[k];
+    batch.to_j[k] = record_size * (batch.i[k] - batch.first);
     batch.from[k] = -1;
   }
   const std::size_t own = static_cast<std::size_t>(batch.count) * record_size;
+  const std::size_t spare = own + batch.halo.size() * record_size;
+  find_owner_runs(batch.i.data(), batch.padded, batch.first, static_cast<std::int32_t>(spare), batch.again.data(), batch.to_last.data());
   batch.sum.resize(own);
-  batch.sum.resize(own + batch.halo.size() * record_size);
+  batch.sum.resize(spare + spare_records * record_size);
 }
 
 void connect_halos(std::vector<Batch>& batches, const ParallelFor& parallel) {
@@ -124,7 +130,7 @@ PairHistories pair_history(const std::vector<Batch>& batches, const Particles& p
   const auto for_each = [&](const auto& visit) {
     for (const Batch& b : batches)
       for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k)
-        if (has_history(b, k)) visit(b, k, p.rank[static_cast<std::size_t>(b.i[k])], p.rank[static_cast<std::size_t>(b.j[k])]);
+        if (has_history(b, k)) visit(b, k, p.rank[static_cast<std::size_t>(b.i[k])], p.rank[static_cast<std::size_t>(b.j(k))]);
   };
   for_each([&](const Batch&, std::size_t, std::int32_t ri, std::int32_t rj) {
     ++all.start[static_cast<std::size_t>(std::min(ri, rj)) + 1];
@@ -174,7 +180,7 @@ void prune(std::vector<Batch>& batches, const Particles& p, const Domain& domain
         inner.sp[to] = b.sp[old], inner.tx[to] = b.tx[old], inner.ty[to] = b.ty[old], inner.tz[to] = b.tz[old];
         if (with_k_t) inner.k_t[to] = b.k_t_last[old];
       } else if (has_history(b, old)) {
-        lost(p, b.i[old], b.j[old]);
+        lost(p, b.i[old], b.j(old));
       }
     }
     install(b, inner, p);

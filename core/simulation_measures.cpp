@@ -55,7 +55,7 @@ struct PairSums {
 
 void add_pairs(const Batch& b, const Particles& p, const Domain& domain, const LawConstants& c, PairSums& sums) {
   for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k) {
-    const PairState s = pair_state(p, domain, b.i[k], b.j[k]);
+    const PairState s = pair_state(p, domain, b.i[k], b.j(k));
     if (!(s.delta > 0.0)) continue;
     sums.deepest = std::max(sums.deepest, s.delta / (2.0 * std::min(s.R_i, s.R_j)));
     sums.elastic.add(normal_energy(c, s.delta, b.sp[k]));
@@ -264,8 +264,8 @@ Snapshot Simulation::snapshot(bool with_contacts) {
   std::vector<Row> rows;
   for (const Batch& b : batches_)
     for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k) {
-      const std::int32_t ri = p.rank[static_cast<std::size_t>(b.i[k])], rj = p.rank[static_cast<std::size_t>(b.j[k])];
-      if (pair_state(p, domain_, b.i[k], b.j[k]).delta > 0.0) rows.push_back({std::min(ri, rj), std::max(ri, rj), &b, k});
+      const std::int32_t ri = p.rank[static_cast<std::size_t>(b.i[k])], rj = p.rank[static_cast<std::size_t>(b.j(k))];
+      if (pair_state(p, domain_, b.i[k], b.j(k)).delta > 0.0) rows.push_back({std::min(ri, rj), std::max(ri, rj), &b, k});
     }
   std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.low != b.low ? a.low < b.low : a.high < b.high; });
   ContactFields& c = out.contacts;
@@ -273,7 +273,7 @@ Snapshot Simulation::snapshot(bool with_contacts) {
     const Batch& b = *row.batch;
     const std::size_t k = row.k;
     const bool straight = p.rank[static_cast<std::size_t>(b.i[k])] == row.low;
-    const std::int32_t low = straight ? b.i[k] : b.j[k], high = straight ? b.j[k] : b.i[k];
+    const std::int32_t low = straight ? b.i[k] : b.j(k), high = straight ? b.j(k) : b.i[k];
     const double sign = straight ? 1.0 : -1.0;
     const PairState s = pair_state(p, domain_, low, high);
     const auto a = static_cast<std::size_t>(low), d = static_cast<std::size_t>(high);
@@ -370,8 +370,8 @@ StepLimits Simulation::limits_of_network(std::string* ruled_by) {
   std::vector<int> plates;  // of the contacts behind those of pairs
   for (const Batch& b : batches_)
     for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k) {
-      const std::int32_t ri = particles_.rank[static_cast<std::size_t>(b.i[k])], rj = particles_.rank[static_cast<std::size_t>(b.j[k])];
-      const PairState s = ri < rj ? pair_state(particles_, domain_, b.i[k], b.j[k]) : pair_state(particles_, domain_, b.j[k], b.i[k]);
+      const std::int32_t ri = particles_.rank[static_cast<std::size_t>(b.i[k])], rj = particles_.rank[static_cast<std::size_t>(b.j(k))];
+      const PairState s = ri < rj ? pair_state(particles_, domain_, b.i[k], b.j(k)) : pair_state(particles_, domain_, b.j(k), b.i[k]);
       if (!(s.delta > 0.0)) continue;
       const double K1 = loading_slope(law_, s.delta);
       const double beta = std::sqrt(law_.damping * s.m_eff * K1);
@@ -436,7 +436,7 @@ void Simulation::fail(const std::string& what) {
   double severity = 0.5;
   for (const Batch& b : batches_)
     for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k) {
-      const PairState s = pair_state(particles_, domain_, b.i[k], b.j[k]);
+      const PairState s = pair_state(particles_, domain_, b.i[k], b.j(k));
       if (!(s.delta > 0.0)) continue;
       const double normal = law_.f0 + law_.k2 * (overlap_power(law_, s.delta) - b.sp[k]);
       const double spring = std::sqrt(b.tx[k] * b.tx[k] + b.ty[k] * b.ty[k] + b.tz[k] * b.tz[k]);
@@ -446,14 +446,14 @@ void Simulation::fail(const std::string& what) {
     }
   if (worst_batch != nullptr) {
     const Batch& b = *worst_batch;
-    const PairState s = pair_state(particles_, domain_, b.i[worst], b.j[worst]);
-    const auto i = static_cast<std::size_t>(b.i[worst]), j = static_cast<std::size_t>(b.j[worst]);
+    const PairState s = pair_state(particles_, domain_, b.i[worst], b.j(worst));
+    const auto i = static_cast<std::size_t>(b.i[worst]), j = static_cast<std::size_t>(b.j(worst));
     const double R = std::min(s.R_i, s.R_j);
     const double approach = (particles_.vx[j] - particles_.vx[i]) * s.n[0] + (particles_.vy[j] - particles_.vy[i]) * s.n[1] +
                             (particles_.vz[j] - particles_.vz[i]) * s.n[2];
     std::snprintf(line, sizeof line,
                   "; spheres %lld at (%g, %g, %g) m and %lld at (%g, %g, %g) m overlap by %.2f R (plastic %.2f R), approach at %g m/s, push with %g N, rub with %g N",
-                  id(b.i[worst]), particles_.x[i], particles_.y[i], particles_.z[i], id(b.j[worst]), particles_.x[j], particles_.y[j], particles_.z[j],
+                  id(b.i[worst]), particles_.x[i], particles_.y[i], particles_.z[i], id(b.j(worst)), particles_.x[j], particles_.y[j], particles_.z[j],
                   s.delta / R, overlap_root(law_, b.sp[worst]) / R, approach, law_.f0 + law_.k2 * (overlap_power(law_, s.delta) - b.sp[worst]),
                   std::sqrt(b.tx[worst] * b.tx[worst] + b.ty[worst] * b.ty[worst] + b.tz[worst] * b.tz[worst]));
     text += line;

@@ -15,12 +15,10 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
   using Wide = typename Interleaved<I>::Type;
   const PairBatch b = batch;  // copies, which no store through a pointer can change
   const LawConstants c = constants;
-  typename I::Record carried = I::zero_record();
-  std::int32_t owner = -1;
+  CarriedSum<I> carried;
   bool fine = true;
   Chunk<scene> chunk;
   GatheredPairs<Wide, scene> gathered;
-  alignas(64) const double nothing[record_size] = {};
   typename I::Real shortest_lever = I::set(1.0);
   for (std::int32_t start = 0; start < b.count; start += chunk_size) {
     const int count = start + chunk_size < b.count ? chunk_size : b.count - start;
@@ -30,7 +28,10 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
       for (int at = 0; at < count; at += I::width) fetch_geometry<I, scene, exact, false>(chunk, at, b, c, start + at);
     ActiveVectors active = active_vectors<Wide, scene>(chunk, b, count);
     const bool few = GatheredPairs<Wide, scene>::worth(active);
-    if (few) gathered.take(chunk, b, start, active);
+    if (few) {
+      gathered.take(chunk, b, start, active);
+      carried.bring_home(b);
+    }
     const PairBatch seen = few ? gathered.view(b) : b;
     const std::int32_t first = few ? 0 : start;
     for (int m = 0; m < active.count; ++m)
@@ -48,9 +49,13 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
     }
     for (int m = 0; m < active.count; ++m)
       for (int at = active.at[m]; at < active.at[m] + Wide::width; at += I::width)
-        output_pairs<I, scene>(chunk, at, seen, c, first + at, nothing, carried, owner);
-    if (few) gathered.give_back(b);
+        output_pairs<I, scene>(chunk, at, seen, c, first + at, carried.before(seen, first + at, I::width));
+    if (few) {
+      carried.bring_home(seen);
+      gathered.give_back(b);
+    }
   }
+  carried.bring_home(b);
   totals.out_of_range = totals.out_of_range || !fine;
 }
 

@@ -11,10 +11,10 @@ template <class I>
 struct RowPart {
   typename I::Real of[4];
 };
-template <class I>
-PLATEN_INLINE RowPart<I> fetch_part(const double* rows, int part, const std::int32_t* index) {
+template <class I, int unit>
+PLATEN_INLINE RowPart<I> fetch_part(const double* rows, int part, const std::int32_t* place) {
   RowPart<I> f;
-  I::fetch_rows(rows + 4 * part, index, f.of);
+  I::template fetch_rows<unit>(rows + 4 * part, place, f.of);
   return f;
 }
 // The owner side. Consecutive contacts share owners, and owners follow each other along the curve: eight contacts mostly
@@ -33,7 +33,7 @@ PLATEN_INLINE void fetch_owners(const PairBatch& b, int first_part, std::int32_t
       return;
     }
   }
-  for (int part = 0; part < parts; ++part) f[part] = fetch_part<I>(b.rows, first_part + part, b.i + k);
+  for (int part = 0; part < parts; ++part) f[part] = fetch_part<I, row_size>(b.rows, first_part + part, b.i + k);
 }
 
 // Distance, normal and overlap of `width` pairs from `k` on.
@@ -42,7 +42,7 @@ PLATEN_INLINE void fetch_geometry(Chunk<scene>& chunk, int at, const PairBatch& 
   using Real = typename I::Real;
   RowPart<I> i[1];
   fetch_owners<I, scene>(b, 0, k, i);
-  const RowPart<I> j = fetch_part<I>(b.rows, 0, b.j + k);
+  const RowPart<I> j = fetch_part<I, 1>(b.rows, 0, b.row_j + k);
   // Nearest image: an odd function that changes no bit of a pair inside the box.
   Vec3<I> d = {i[0].of[0] - j.of[0], i[0].of[1] - j.of[1], i[0].of[2] - j.of[2]};
   if constexpr (periodic) {
@@ -69,7 +69,7 @@ PLATEN_INLINE typename I::Real fetch_motion(Chunk<scene>& chunk, int at, const P
   using Real = typename I::Real;
   RowPart<I> i[2];  // velocity and mass, spin and 1/R
   fetch_owners<I, scene>(b, 1, k, i);
-  const RowPart<I> j[2] = {fetch_part<I>(b.rows, 1, b.j + k), fetch_part<I>(b.rows, 2, b.j + k)};
+  const RowPart<I> j[2] = {fetch_part<I, 1>(b.rows, 1, b.row_j + k), fetch_part<I, 1>(b.rows, 2, b.row_j + k)};
   const Vec3<I> n = chunk.template take<I>(chunk.n, at);
   const Real half = I::set(0.5) * I::load(chunk.delta + at);
   Real inverse_R_i, inverse_R_j;

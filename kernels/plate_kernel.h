@@ -24,7 +24,7 @@ void plate_kernel(const PlateBatch& b, const Plane& plane, const PlateConstants&
 
   for (std::int32_t k = 0; k < b.count; k += I::width) {
     Real row[12];
-    I::fetch_rows(b.rows, b.particle + k, row);
+    I::template fetch_rows<row_size>(b.rows, b.particle + k, row);
     const Real *x = row, *v = row + 4, *u = row + 8;
     const Real R = x[3], m = v[3], inverse_R = u[3];
     const Real distance = sign * (x[plane.axis] - I::set(plane.position));

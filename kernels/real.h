@@ -62,10 +62,10 @@ struct Scalar {
   static PLATEN_INLINE double sum(Real a) { return a; }  // exact for order-free terms, whose order does not matter
   static PLATEN_INLINE double largest(Real a) { return a; }
 
-  // fields[k][lane] <- rows[12 index[lane] + k], k = 0..n-1: n (a multiple of 4) numbers of `width` rows of twelve from `rows` on.
-  template <int n>
-  static PLATEN_INLINE void fetch_rows(const double* rows, const std::int32_t* index, Real (&fields)[n]) {
-    const double* p = rows + 12 * static_cast<std::int64_t>(index[0]);
+  // fields[k][lane] <- rows[unit place[lane] + k], k = 0..n-1: n (a multiple of 4) numbers of `width` rows.
+  template <int unit, int n>
+  static PLATEN_INLINE void fetch_rows(const double* rows, const std::int32_t* place, Real (&fields)[n]) {
+    const double* p = rows + unit * static_cast<std::int64_t>(place[0]);
     for (int k = 0; k < n; ++k) fields[k] = p[k];
   }
   // rows[index[0] + lane][first + k] <- fields[k][lane]
@@ -90,7 +90,8 @@ struct Scalar {
     for (int k = 0; k < 8; ++k) r.v[k] = a.v[k] + b.v[k];
     return r;
   }
-  static PLATEN_INLINE Record select(bool yes, const Record& a, const Record& b) { return yes ? a : b; }
+  // a + b where all bits of `yes` are set, b where none is.
+  static PLATEN_INLINE Record add_if(std::uint8_t yes, const Record& a, const Record& b) { return yes != 0 ? add(a, b) : b; }
   // a and what b does to the other side: the reaction of a force (the first three), the rest as it is.
   static PLATEN_INLINE Record add_reaction(const Record& a, const Record& b) {
     Record r;
@@ -159,11 +160,11 @@ struct Avx2 {
     c = _mm256_permute2f128_pd(ab_lo, cd_lo, 0x31);
     d = _mm256_permute2f128_pd(ab_hi, cd_hi, 0x31);
   }
-  template <int n>
-  static PLATEN_INLINE void fetch_rows(const double* rows, const std::int32_t* index, Real (&fields)[n]) {
+  template <int unit, int n>
+  static PLATEN_INLINE void fetch_rows(const double* rows, const std::int32_t* place, Real (&fields)[n]) {
     __m256d part[n / 4][4];
     for (int lane = 0; lane < 4; ++lane) {
-      const double* p = rows + 12 * static_cast<std::int64_t>(index[lane]);
+      const double* p = rows + unit * static_cast<std::int64_t>(place[lane]);
       for (int k = 0; k < n / 4; ++k) part[k][lane] = _mm256_loadu_pd(p + 4 * k);
     }
     for (int k = 0; k < n / 4; ++k) {
@@ -202,9 +203,9 @@ struct Avx2 {
   static PLATEN_INLINE Record add(const Record& a, const Record& b) {
     return {_mm256_add_pd(a.lo, b.lo), _mm256_add_pd(a.hi, b.hi)};
   }
-  static PLATEN_INLINE Record select(bool yes, const Record& a, const Record& b) {
-    const __m256d m = _mm256_castsi256_pd(_mm256_set1_epi64x(-static_cast<long long>(yes)));
-    return {_mm256_blendv_pd(b.lo, a.lo, m), _mm256_blendv_pd(b.hi, a.hi, m)};
+  static PLATEN_INLINE Record add_if(std::uint8_t yes, const Record& a, const Record& b) {
+    const __m256d m = _mm256_castsi256_pd(_mm256_set1_epi8(static_cast<char>(yes)));
+    return {_mm256_add_pd(_mm256_and_pd(a.lo, m), b.lo), _mm256_add_pd(_mm256_and_pd(a.hi, m), b.hi)};
   }
   static PLATEN_INLINE Record add_reaction(const Record& a, const Record& b) {
     return {_mm256_fmadd_pd(b.lo, _mm256_set_pd(1.0, -1.0, -1.0, -1.0), a.lo), _mm256_add_pd(a.hi, b.hi)};
@@ -271,12 +272,12 @@ struct Avx512 {
   static PLATEN_INLINE double sum(Real a) { return _mm512_reduce_add_pd(a); }
   static PLATEN_INLINE double largest(Real a) { return _mm512_reduce_max_pd(a); }
 
-  template <int n>
-  static PLATEN_INLINE void fetch_rows(const double* rows, const std::int32_t* index, Real (&fields)[n]) {
+  template <int unit, int n>
+  static PLATEN_INLINE void fetch_rows(const double* rows, const std::int32_t* place, Real (&fields)[n]) {
     __m512d part[n / 4][4];
     for (int lane = 0; lane < 4; ++lane) {
-      const double* p = rows + 12 * static_cast<std::int64_t>(index[lane]);
-      const double* q = rows + 12 * static_cast<std::int64_t>(index[lane + 4]);
+      const double* p = rows + unit * static_cast<std::int64_t>(place[lane]);
+      const double* q = rows + unit * static_cast<std::int64_t>(place[lane + 4]);
       for (int k = 0; k < n / 4; ++k)
         part[k][lane] = _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(p + 4 * k)), _mm256_loadu_pd(q + 4 * k), 1);
     }
@@ -337,8 +338,8 @@ struct Avx512 {
   static PLATEN_INLINE Record load_record(const double* p) { return {_mm512_load_pd(p)}; }
   static PLATEN_INLINE void store_record(double* p, const Record& r) { _mm512_store_pd(p, r.v); }
   static PLATEN_INLINE Record add(const Record& a, const Record& b) { return {_mm512_add_pd(a.v, b.v)}; }
-  static PLATEN_INLINE Record select(bool yes, const Record& a, const Record& b) {
-    return {_mm512_mask_blend_pd(static_cast<__mmask8>(-static_cast<int>(yes)), b.v, a.v)};
+  static PLATEN_INLINE Record add_if(std::uint8_t yes, const Record& a, const Record& b) {
+    return {_mm512_mask_add_pd(b.v, static_cast<__mmask8>(yes), a.v, b.v)};
   }
   static PLATEN_INLINE Record add_reaction(const Record& a, const Record& b) {
     return {_mm512_fmadd_pd(b.v, _mm512_set_pd(1.0, 1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0), a.v)};

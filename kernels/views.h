@@ -22,6 +22,7 @@ inline constexpr int record_size = 8;  // doubles of a record
 inline constexpr int chunk_size = 64;  // contacts between two conversions of energies to integers
 inline constexpr int padding = 8;        // particles are padded to a multiple of the widest vector
 inline constexpr int pair_padding = 16;  // contacts to what a kernel takes at once: two such vectors
+inline constexpr int spare_records = 8;  // of a batch's sums, behind the halo slots, for what has no place of its own
 
 // x rounded to a multiple of q: (x + magic) - magic with magic = 1.5 * 2^52 * q. Sums of such numbers are exact as long
 // as they stay below 2^53 q, hence the same in any order.
@@ -62,19 +63,23 @@ struct LawConstants {
 
 // The contacts that a batch owns. Sorted by i, then j; `count` is a multiple of `pair_padding`, padded with i = j.
 //
-//   contact:      0     1     2     3     4   ...
-//   i             17    17    17    18    20  ...   owner side: particle of this batch
-//   j             18    25    903   25    21  ...   any particle
-//   slot_j        1     8     512   8     4   ...   where j's share goes: own particle, or halo slot after them
+//   contact:      0      1      2      3     4   ...
+//   i             17     17     17     18    20  ...   owner side: particle of this batch
+//   row_j         216    300    10836  300   252 ...   row of the partner j, any particle: 12 j, in doubles from `rows`
+//   to_j          8      64     4096   64    32  ...   where j's share goes, in doubles from `sum`: an own particle, or a halo slot
+//   again         -      all    all    -     -         all bits where the owner is that of the contact before
+//   to_last       spare  spare  spare  0     8   ...   where the owner is another one: record of that of the contact before
 struct PairBatch {
   const double* rows;
-  const std::int32_t *i, *j, *slot_j;
+  const std::int32_t *i, *row_j, *to_j, *to_last;
+  const std::uint8_t* again;
   double *sp, *tx, *ty, *tz;
   double* k_t_last;     // exponent other than 1: k_t of the step before; null otherwise
-  double* sum;          // records: by i - first, and by slot_j
+  double* sum;          // records: of own particles, halo slots, spare ones
   std::int32_t first;   // first particle of the batch
   std::int32_t count;
   std::int32_t end;     // one past the batch's last particle
+  std::int32_t spare;   // place of the spare records, in doubles from `sum`
   double leap;          // bound of the change of any pair's distance in the last step [m]
   const double *x, *y, *z, *vx, *vy, *vz, *ux, *uy, *uz;  // the state itself, for the owner side
 };

@@ -201,11 +201,13 @@ class RealChecks {
       std::int32_t index[W];
       for (int lane = 0; lane < W; ++lane) index[lane] = (start + 7 * lane * lane) % rows;
       Real fields[12];
-      I::fetch_rows(row, index, fields);
+      I::template fetch_rows<12>(row, index, fields);
       for (int k = 0; k < 12; ++k)
         each("fetch_rows", fields[k], [&](int lane) { return 1000.0 + 12 * index[lane] + k; });
       Real part_of_row[4];
-      I::fetch_rows(row + 8, index, part_of_row);
+      std::int32_t place[W];
+      for (int lane = 0; lane < W; ++lane) place[lane] = 12 * index[lane];
+      I::template fetch_rows<1>(row + 8, place, part_of_row);
       for (int k = 0; k < 4; ++k)
         each("fetch_rows", part_of_row[k], [&](int lane) { return 1008.0 + 12 * index[lane] + k; });
 
@@ -236,10 +238,10 @@ class RealChecks {
       for (int k = 0; k < 8; ++k) same("to_records", a[k], 10.0 * lane + k + 0.5);
       I::store_record(b, I::add(records[lane], I::load_record(a)));
       for (int k = 0; k < 8; ++k) same("add", b[k], a[k] + a[k]);
-      I::store_record(b, I::select(true, records[lane], I::zero_record()));
-      for (int k = 0; k < 8; ++k) same("select", b[k], a[k]);
-      I::store_record(b, I::select(false, records[lane], I::zero_record()));
-      for (int k = 0; k < 8; ++k) same("select not", b[k], 0.0);
+      I::store_record(b, I::add_if(0xff, records[lane], I::load_record(a)));
+      for (int k = 0; k < 8; ++k) same("add_if", b[k], a[k] + a[k]);
+      I::store_record(b, I::add_if(0, records[0], I::load_record(a)));
+      for (int k = 0; k < 8; ++k) same("add_if not", b[k], a[k]);
       I::store_record(b, I::add_reaction(I::load_record(a), records[W - 1 - lane]));
       for (int k = 0; k < 8; ++k) {
         const double other = 10.0 * (W - 1 - lane) + k + 0.5;
@@ -249,8 +251,8 @@ class RealChecks {
     I::store_record(b, I::zero_record());
     for (int k = 0; k < 8; ++k) same("zero_record", b[k], 0.0);
     for (double& x : a) x = std::numeric_limits<double>::quiet_NaN();
-    I::store_record(b, I::select(false, I::load_record(a), records[0]));  // what is left out may be anything
-    for (int k = 0; k < 8; ++k) same("select no NaN", b[k], k + 0.5);
+    I::store_record(b, I::add_if(0, I::load_record(a), records[0]));  // what is left out may be anything
+    for (int k = 0; k < 8; ++k) same("add_if no NaN", b[k], k + 0.5);
   }
 
  public:

@@ -250,7 +250,7 @@ TEST(Lists, PairsThatPartedRememberNothing) {
           for (const Batch& b : sim.batches()) {
             const double leap = sim.leap_of(b, dt);
             for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k) {
-              const auto i = static_cast<std::size_t>(b.i[k]), j = static_cast<std::size_t>(b.j[k]);
+              const auto i = static_cast<std::size_t>(b.i[k]), j = static_cast<std::size_t>(b.j(k));
               const std::pair<std::int32_t, std::int32_t> pair = std::minmax(p.rank[i], p.rank[j]);
               const double d = now[pair] = distance(p, i, j, setup.width, setup.depth);
               const auto last = before.find(pair);
