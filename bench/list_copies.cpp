@@ -67,7 +67,7 @@ PairBatch BatchCopy::pairs(const StateCopy& state) {
   b.k_t_last = k_t_last.empty() ? nullptr : k_t_last.data();
   b.sum = sum.data();
   b.first = first, b.count = padded, b.end = first + count;
-  b.spare = static_cast<std::int32_t>(sum.size()) - spare_records * record_size;
+  b.spare = static_cast<std::int32_t>(sum.size() * sizeof(double)) - spare_records * record_bytes;
   b.leap = std::numeric_limits<double>::infinity();  // every listed pair goes through the law
   b.x = state.x.data(), b.y = state.y.data(), b.z = state.z.data();
   b.vx = state.vx.data(), b.vy = state.vy.data(), b.vz = state.vz.data();

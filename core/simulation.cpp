@@ -300,7 +300,7 @@ void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, 
   if (put_aside) saved_->batches[index].sums.swap(b.sum);
   std::memset(b.sum.data(), 0, b.sum.size() * sizeof(double));
   const double leap = leap_of(b, law.dt);
-  const auto spare = static_cast<std::int32_t>(b.sum.size()) - spare_records * record_size;
+  const auto spare = static_cast<std::int32_t>(b.sum.size() * sizeof(double)) - spare_records * record_bytes;
   const PairBatch pairs{particles_.rows.data(), b.i.data(), b.row_j.data(), b.to_j.data(), b.to_last.data(), b.again.data(), b.sp.data(), b.tx.data(),
                         b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum.data(), b.first, b.padded, b.first + b.count, spare, leap,
                         particles_.x.data(), particles_.y.data(), particles_.z.data(), particles_.vx.data(),

@@ -68,7 +68,7 @@ class GatheredPairs {
     for (; n % I::width != 0; ++n) {  // never entered with n = 0, so that n - 1 is a pair
       chunk.move(n, n - 1);
       chunk.delta[n] = -1.0;
-      i_[n] = i_[n - 1], row_j_[n] = row_size * i_[n], to_j_[n] = record_size * (i_[n] - b.first);
+      i_[n] = i_[n - 1], row_j_[n] = row_size * i_[n], to_j_[n] = record_bytes * (i_[n] - b.first);
       tx_[n] = ty_[n] = tz_[n] = sp_[n] = k_t_last_[n] = 0.0;
     }
     find_owner_runs(i_, n, b.first, b.spare, again_, to_last_);

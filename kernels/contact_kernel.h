@@ -15,7 +15,8 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
   using Wide = typename Interleaved<I>::Type;
   const PairBatch b = batch;  // copies, which no store through a pointer can change
   const LawConstants c = constants;
-  CarriedSum<I> carried;
+  typename I::Record carried = I::zero_record();
+  std::int32_t next = 0;  // contact after the last one whose share is carried
   bool fine = true;
   Chunk<scene> chunk;
   GatheredPairs<Wide, scene> gathered;
@@ -30,7 +31,8 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
     const bool few = GatheredPairs<Wide, scene>::worth(active);
     if (few) {
       gathered.take(chunk, b, start, active);
-      carried.bring_home(b);
+      bring_home<I>(b, next, carried);
+      next = 0;
     }
     const PairBatch seen = few ? gathered.view(b) : b;
     const std::int32_t first = few ? 0 : start;
@@ -47,15 +49,19 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
       fine = fine && !I::any(shortest_lever < I::set(0.5)) && !too_strong<Wide, scene>(chunk, active, c.force.bound, c.watched_lever);
       shortest_lever = I::set(1.0);
     }
-    for (int m = 0; m < active.count; ++m)
+    for (int m = 0; m < active.count; ++m) {
+      if (first + active.at[m] != next) bring_home<I>(seen, next, carried);
       for (int at = active.at[m]; at < active.at[m] + Wide::width; at += I::width)
-        output_pairs<I, scene>(chunk, at, seen, c, first + at, carried.before(seen, first + at, I::width));
+        output_pairs<I, scene>(chunk, at, seen, c, first + at, carried);
+      next = first + active.at[m] + Wide::width;
+    }
     if (few) {
-      carried.bring_home(seen);
+      bring_home<I>(seen, next, carried);
+      next = 0;
       gathered.give_back(b);
     }
   }
-  carried.bring_home(b);
+  bring_home<I>(b, next, carried);
   totals.out_of_range = totals.out_of_range || !fine;
 }
 

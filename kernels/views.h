@@ -19,6 +19,7 @@ namespace platen {
 
 inline constexpr int row_size = 12;    // doubles of a particle's row
 inline constexpr int record_size = 8;  // doubles of a record
+inline constexpr int record_bytes = 64;
 inline constexpr int chunk_size = 64;  // contacts between two conversions of energies to integers
 inline constexpr int padding = 8;        // particles are padded to a multiple of the widest vector
 inline constexpr int pair_padding = 16;  // contacts to what a kernel takes at once: two such vectors
@@ -66,9 +67,11 @@ struct LawConstants {
 //   contact:      0      1      2      3     4   ...
 //   i             17     17     17     18    20  ...   owner side: particle of this batch
 //   row_j         216    300    10836  300   252 ...   row of the partner j, any particle: 12 j, in doubles from `rows`
-//   to_j          8      64     4096   64    32  ...   where j's share goes, in doubles from `sum`: an own particle, or a halo slot
+//   to_j          64     512    32768  512   256 ...   where j's share goes, in bytes from `sum`: an own particle, or a halo slot
 //   again         -      all    all    -     -         all bits where the owner is that of the contact before
-//   to_last       spare  spare  spare  0     8   ...   where the owner is another one: record of that of the contact before
+//   to_last       spare  spare  spare  0     64  ...   where the owner is another one: record of that of the contact before
+//
+// Bytes, because an address that takes a multiplication costs a tenth of the output phase.
 struct PairBatch {
   const double* rows;
   const std::int32_t *i, *row_j, *to_j, *to_last;
@@ -79,7 +82,7 @@ struct PairBatch {
   std::int32_t first;   // first particle of the batch
   std::int32_t count;
   std::int32_t end;     // one past the batch's last particle
-  std::int32_t spare;   // place of the spare records, in doubles from `sum`
+  std::int32_t spare;   // place of the spare records, in bytes from `sum`
   double leap;          // bound of the change of any pair's distance in the last step [m]
   const double *x, *y, *z, *vx, *vy, *vz, *ux, *uy, *uz;  // the state itself, for the owner side
 };
