@@ -30,9 +30,7 @@ PlateBatch PlateCopy::view(const StateCopy& state) {
 BatchCopy::BatchCopy(const Batch& b)
     : i(copy_of(b.i)),
       row_j(copy_of(b.row_j)),
-      to_j(copy_of(b.to_j)),
-      to_last(copy_of(b.to_last)),
-      again(copy_of(b.again)),
+      targets(copy_of(b.to)),
       sp(copy_of(b.sp)),
       tx(copy_of(b.tx)),
       ty(copy_of(b.ty)),
@@ -45,6 +43,7 @@ BatchCopy::BatchCopy(const Batch& b)
       used(b.used),
       padded(b.padded),
       incoming(b.incoming) {
+  nowhere.resize(record_size);
   for (int plate = 0; plate < plate_count; ++plate) {
     const PlateList& from = b.plates[plate];
     if (from.used == 0) continue;
@@ -62,7 +61,7 @@ BatchCopy::BatchCopy(const Batch& b)
 PairBatch BatchCopy::pairs(const StateCopy& state) {
   PairBatch b{};
   b.rows = state.rows.data();
-  b.i = i.data(), b.row_j = row_j.data(), b.to_j = to_j.data(), b.to_last = to_last.data(), b.again = again.data();
+  b.i = i.data(), b.row_j = row_j.data(), b.to = targets.data();
   b.sp = sp.data(), b.tx = tx.data(), b.ty = ty.data(), b.tz = tz.data();
   b.k_t_last = k_t_last.empty() ? nullptr : k_t_last.data();
   b.sum = sum.data();
@@ -75,7 +74,7 @@ PairBatch BatchCopy::pairs(const StateCopy& state) {
   return b;
 }
 
-MotionBatch BatchCopy::motion(StateCopy& s) {
+MotionBatch BatchCopy::motion(StateCopy& s, bool clears) {
   const auto at = static_cast<std::size_t>(first);
   const auto column = [&](AlignedArray<double>& a) { return a.empty() ? nullptr : a.data() + at; };
   return {column(s.x),
@@ -94,6 +93,8 @@ MotionBatch BatchCopy::motion(StateCopy& s) {
           s.rows.data() + row_size * at,
           s.image.data() + 2 * at,
           sum.data(),
+          clears ? sum.data() : nowhere.data(),
+          clears ? record_size : 0,
           inverse_room2.data(),
           count};
 }
@@ -101,7 +102,7 @@ MotionBatch BatchCopy::motion(StateCopy& s) {
 std::int64_t BatchCopy::list_bytes() const {
   const std::int64_t history = k_t_last.empty() ? 4 : 5;
   return padded *
-         static_cast<std::int64_t>(4 * sizeof(std::int32_t) + sizeof(std::uint8_t) + 2 * sizeof(double) * static_cast<std::size_t>(history));
+         static_cast<std::int64_t>(2 * sizeof(std::int32_t) + sizeof(PairTargets) + 2 * sizeof(double) * static_cast<std::size_t>(history));
 }
 
 std::int64_t BatchCopy::row_bytes() const {
@@ -133,6 +134,7 @@ MotionConstants motion_constants(const Simulation& sim, const PairLaw& law, doub
   c.radius = p.common_radius, c.inverse_radius = 1.0 / p.common_radius;
   c.width = sim.law().width, c.depth = sim.law().depth;
   c.energy = sim.law().energy;
+  c.strongest2 = std::numeric_limits<double>::infinity();
   return c;
 }
 

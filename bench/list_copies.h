@@ -32,15 +32,16 @@ struct PlateCopy {
 
 struct BatchCopy {
   explicit BatchCopy(const Batch& b);
-  AlignedArray<std::int32_t> i, row_j, to_j, to_last;
-  AlignedArray<std::uint8_t> again;
+  AlignedArray<std::int32_t> i, row_j;
+  AlignedArray<PairTargets> targets;
   AlignedArray<double> sp, tx, ty, tz, k_t_last, sum;
   std::vector<double> inverse_room2;  // none: nothing is watched
+  AlignedArray<double> nowhere;
   std::int32_t first = 0, count = 0, used = 0, padded = 0;
   std::vector<Incoming> incoming;
   std::vector<PlateCopy> plates;  // those with spheres near them
   PairBatch pairs(const StateCopy& state);
-  MotionBatch motion(StateCopy& state);
+  MotionBatch motion(StateCopy& state, bool clears = false);  // `clears`: the sums of own particles
   // What a pass reads and writes [bytes]: lists and history, rows of the spheres that occur, sums.
   std::int64_t list_bytes() const;
   std::int64_t row_bytes() const;

@@ -45,13 +45,14 @@ void ParallelForStep::integrate(int batch) {
   BatchCopy& b = batches_[static_cast<std::size_t>(batch)];
   if (!merged_) merge(b);
   MotionTotals totals;
-  kernels_.motion(b.motion(state_), motion_, totals);
+  kernels_.motion(b.motion(state_, true), motion_, totals);
 }
 
 void ParallelForStep::contacts(int batch) {
   const FloatMode mode;
   BatchCopy& b = batches_[static_cast<std::size_t>(batch)];
-  std::memset(b.sum.data(), 0, b.sum.size() * sizeof(double));
+  const auto own = static_cast<std::size_t>(b.count) * record_size;  // zero already
+  std::memset(b.sum.data() + own, 0, (b.sum.size() - own) * sizeof(double));
   PairTotals& totals = totals_[static_cast<std::size_t>(batch)];
   totals.contacts = 0;
   kernels_.contacts(b.pairs(state_), law_, totals);

@@ -39,9 +39,9 @@ struct Batch {
   std::vector<std::int32_t> outer_i, outer_j;
 
   std::int32_t used = 0, padded = 0;  // pairs of the inner list
-  AlignedArray<std::int32_t> i, row_j, to_j, to_last;  // kernels/views.h
-  AlignedArray<std::uint8_t> again;
-  AlignedArray<std::int32_t> from;                     // place in the outer list
+  AlignedArray<std::int32_t> i, row_j;  // kernels/views.h
+  AlignedArray<PairTargets> to;
+  AlignedArray<std::int32_t> from;      // place in the outer list
   std::int32_t j(std::size_t k) const { return row_j[k] / row_size; }
   AlignedArray<double> sp, tx, ty, tz, k_t_last;
 

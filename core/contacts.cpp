@@ -51,8 +51,8 @@ void install(Batch& batch, Inner& inner, const Particles& p) {
   batch.used = static_cast<std::int32_t>(inner.from.size());
   batch.padded = static_cast<std::int32_t>(inner.padded());
   const auto size = inner.padded();
-  for (auto* column : {&batch.i, &batch.row_j, &batch.to_j, &batch.to_last, &batch.from}) column->assign(size, 0);
-  batch.again.assign(size, 0);
+  for (auto* column : {&batch.i, &batch.row_j, &batch.from}) column->assign(size, 0);
+  batch.to.assign(size, {});
   batch.sp.swap(inner.sp), batch.tx.swap(inner.tx), batch.ty.swap(inner.ty), batch.tz.swap(inner.tz);
   batch.k_t_last.swap(inner.k_t);
 
@@ -64,7 +64,7 @@ void install(Batch& batch, Inner& inner, const Particles& p) {
     batch.from[k] = inner.from[k];
     batch.i[k] = batch.outer_i[m];
     batch.row_j[k] = row_size * j;
-    batch.to_j[k] = record_bytes * local;
+    batch.to[k].partner = record_bytes * local;
     if (local >= 0 && local < batch.count) continue;
     std::int32_t& slot = inner.slot_of[static_cast<std::size_t>(j)];
     if (slot < 0) slot = 0, batch.halo.push_back(j);
@@ -73,17 +73,17 @@ void install(Batch& batch, Inner& inner, const Particles& p) {
   for (std::size_t k = 0; k < batch.halo.size(); ++k)
     inner.slot_of[static_cast<std::size_t>(batch.halo[k])] = batch.count + static_cast<std::int32_t>(k);
   for (std::size_t k = 0; k < inner.from.size(); ++k)
-    if (const std::int32_t slot = inner.slot_of[static_cast<std::size_t>(batch.j(k))]; slot >= 0) batch.to_j[k] = record_bytes * slot;
+    if (const std::int32_t slot = inner.slot_of[static_cast<std::size_t>(batch.j(k))]; slot >= 0) batch.to[k].partner = record_bytes * slot;
   for (const std::int32_t particle : batch.halo) inner.slot_of[static_cast<std::size_t>(particle)] = -1;
   for (std::size_t k = inner.from.size(); k < size; ++k) {  // harmless repetitions: i with itself
     batch.i[k] = batch.used > 0 ? batch.i[static_cast<std::size_t>(batch.used) - 1] : batch.first;
     batch.row_j[k] = row_size * batch.i[k];
-    batch.to_j[k] = record_bytes * (batch.i[k] - batch.first);
+    batch.to[k].partner = record_bytes * (batch.i[k] - batch.first);
     batch.from[k] = -1;
   }
   const std::size_t own = static_cast<std::size_t>(batch.count) * record_size;
   const std::size_t spare = own + batch.halo.size() * record_size;
-  find_owner_runs(batch.i.data(), batch.padded, batch.first, static_cast<std::int32_t>(spare * sizeof(double)), batch.again.data(), batch.to_last.data());
+  find_owner_runs(batch.i.data(), batch.padded, batch.first, static_cast<std::int32_t>(spare * sizeof(double)), batch.to.data());
   batch.sum.resize(own);
   batch.sum.resize(spare + spare_records * record_size);
 }

@@ -140,6 +140,7 @@ void Simulation::setup_laws(const SimulationSetup& setup) {
   const double F = power_of_two_above(std::max(c.k2, c.k_adh) * s + std::fabs(c.f0) + beta * fastest);
   c.force = {1.5 * 0x1p52 * (F * most * 0x1p-53), F, 1.0 / (F * most * 0x1p-53)};
   most_push_ = 0.25 * F * most;
+  motion_.strongest2 = most_push_ * most_push_;
   const double E = power_of_two_above(F * R), q = E * chunk_size * 0x1p-53;
   c.energy = {1.5 * 0x1p52 * q, E, 1.0 / q};
   // Forces are compared with F where overlaps are above R/2, a lever of 3/4. At smaller ones springs give less than 2.3 F,
@@ -239,16 +240,18 @@ void Simulation::merge(Batch& b) {
   }
 }
 
-void Simulation::integrate(Batch& b, const MotionConstants& c) {
+// `keeps_sums`: a run of steps may have to go back to them. Otherwise they are zero afterwards, for the next contacts.
+void Simulation::integrate(Batch& b, const MotionConstants& c, bool keeps_sums) {
   const auto index = static_cast<std::size_t>(&b - batches_.data());
   if (!merged_[index]) merge(b);
   Particles& p = particles_;
   const auto first = static_cast<std::size_t>(b.first);
   const auto column = [&](AlignedArray<double>& a) { return a.empty() ? nullptr : a.data() + first; };
+  alignas(64) double nowhere[record_size];
   const MotionBatch batch{column(p.x), column(p.y), column(p.z), column(p.vx), column(p.vy), column(p.vz), column(p.ux),
                           column(p.uy), column(p.uz), column(p.inverse_mass), column(p.mass), column(p.radius),
                           column(p.inverse_radius), p.rows.data() + row_size * first, p.image.data() + 2 * first,
-                          b.sum.data(), room_.data() + first, b.count};
+                          b.sum.data(), keeps_sums ? nowhere : b.sum.data(), keeps_sums ? 0 : record_size, room_.data() + first, b.count};
   MotionTotals totals;
   kernels_.motion(batch, c, totals);
   // The places that fill up the last vector rest where they are.
@@ -261,8 +264,12 @@ void Simulation::integrate(Batch& b, const MotionConstants& c) {
   b.fastest = std::sqrt(totals.fastest2);
   b.rolling += totals.rolling;
   b.out_of_range = b.out_of_range || totals.out_of_range;
-  // Pairs far faster than R omega give more than sums hold exactly before they overlap deeply: it shows in a sphere's sum.
-  if (!(totals.strongest < most_push_ * most_push_)) b.out_of_range = b.out_of_range || !pairs_within(b, most_push_);
+  // Pairs far faster than R omega give more than sums hold exactly before they overlap deeply: it shows in a sphere's sum, which
+  // is left for that.
+  if (!(totals.strongest < c.strongest2)) {
+    b.out_of_range = b.out_of_range || !pairs_within(b, most_push_);
+    if (!keeps_sums) std::memset(b.sum.data(), 0, static_cast<std::size_t>(b.count) * record_size * sizeof(double));
+  }
 }
 
 // Whether pairs push every sphere of a batch with less than `most` [N]; plates and walls may push harder. Only spheres that
@@ -294,14 +301,15 @@ double Simulation::leap_of(const Batch& b, double dt) const {
   return (1.0 + 1e-9) * (b.fastest + fastest) * dt + 1e-9 * largest_radius_;
 }
 
-void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law, bool put_aside) {
+void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law, Sums found) {
   const auto index = static_cast<std::size_t>(&b - batches_.data());
   merged_[index] = 0;
-  if (put_aside) saved_->batches[index].sums.swap(b.sum);
-  std::memset(b.sum.data(), 0, b.sum.size() * sizeof(double));
+  if (found == Sums::put_aside) saved_->batches[index].sums.swap(b.sum);
+  const std::size_t cleared = found == Sums::cleared ? static_cast<std::size_t>(b.count) * record_size : 0;
+  std::memset(b.sum.data() + cleared, 0, (b.sum.size() - cleared) * sizeof(double));
   const double leap = leap_of(b, law.dt);
   const auto spare = static_cast<std::int32_t>(b.sum.size() * sizeof(double)) - spare_records * record_bytes;
-  const PairBatch pairs{particles_.rows.data(), b.i.data(), b.row_j.data(), b.to_j.data(), b.to_last.data(), b.again.data(), b.sp.data(), b.tx.data(),
+  const PairBatch pairs{particles_.rows.data(), b.i.data(), b.row_j.data(), b.to.data(), b.sp.data(), b.tx.data(),
                         b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum.data(), b.first, b.padded, b.first + b.count, spare, leap,
                         particles_.x.data(), particles_.y.data(), particles_.z.data(), particles_.vx.data(),
                         particles_.vy.data(), particles_.vz.data(), particles_.ux.data(), particles_.uy.data(),
@@ -329,8 +337,9 @@ void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, 
 void Simulation::run_task(const Task& task) {
   const FloatMode mode;
   Batch& b = batches_[static_cast<std::size_t>(task.batch)];
-  if (task.kind != TaskKind::contacts) integrate(b, task.offset == 0 ? first_motion_ : motion_);
-  if (task.kind != TaskKind::integrate) contacts(b, step_ + task.offset + 1, law_, plate_law_, task.offset == 0);
+  const bool first = task.offset == 0;
+  if (task.kind != TaskKind::contacts) integrate(b, first ? first_motion_ : motion_, first);
+  if (task.kind != TaskKind::integrate) contacts(b, step_ + task.offset + 1, law_, plate_law_, first ? Sums::put_aside : Sums::cleared);
 }
 
 // Forces at the present step without advancing springs: after something other than motion changed.
@@ -339,7 +348,7 @@ void Simulation::ensure_forces() {
   if (forces_valid_) return;
   const FloatMode mode;
   law_.dt = plate_law_.dt = 0.0;
-  parallel(static_cast<int>(batches_.size()), [&](int k) { contacts(batches_[static_cast<std::size_t>(k)], step_, law_, plate_law_, false); });
+  parallel(static_cast<int>(batches_.size()), [&](int k) { contacts(batches_[static_cast<std::size_t>(k)], step_, law_, plate_law_, Sums::old); });
   collect();
   forces_valid_ = true;
   bool bad = false;
@@ -436,6 +445,7 @@ void Simulation::advance(std::int64_t steps) {
       drift_at_prune_[axis] += mean_[axis] * (n * dt_);
     }
     plane_moved_ += plane_path(n);
+    moved_since_prune_ = true;
   }
 }
 

@@ -149,9 +149,10 @@ class Simulation {
   void setup_particles(const SphereTable& spheres);
   void setup_laws(const SimulationSetup& setup);
   void merge(Batch& batch);
-  void integrate(Batch& batch, const MotionConstants& c);
+  void integrate(Batch& batch, const MotionConstants& c, bool keeps_sums);
   bool pairs_within(const Batch& batch, double most) const;
-  void contacts(Batch& batch, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law, bool put_aside);
+  enum class Sums { old, put_aside, cleared };  // what a pass over the contacts finds
+  void contacts(Batch& batch, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law, Sums found);
   void run_task(const Task& task);
   void collect();
   void rebuild();
@@ -227,6 +228,7 @@ class Simulation {
   double drift_at_prune_[3] = {0, 0, 0};
   double plane_moved_ = 0.0;     // bound of the planes' motion since the prune [m]
   bool lists_stale_ = false;     // prune before the next step
+  bool moved_since_prune_ = true;
   int unroll_ = 1;               // steps of the graph
 
   std::unique_ptr<TaskTable> table_;

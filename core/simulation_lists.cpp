@@ -199,7 +199,7 @@ int Simulation::look(int wanted) {
         room_[k] = 0.0;
         continue;
       }
-      const double left = inner_.of[k] - displacement(k, at_prune_, drift_at_prune_);
+      const double left = moved_since_prune_ ? inner_.of[k] - displacement(k, at_prune_, drift_at_prune_) : inner_.of[k];
       const double inverse = 1.0 / std::max(left, 1e-100);  // finite, so that no speed of 0 makes it not a number
       room_[k] = inverse * inverse;
       fastest = std::max(fastest, own_speed(k) * inverse);
@@ -241,6 +241,7 @@ void Simulation::prune_lists() {
   list_plates(batches_, particles_, planes_, step_, inner_, plate_gap_, plates, run);
   remember(at_prune_, drift_at_prune_);
   plane_moved_ = 0.0;
+  moved_since_prune_ = false;
   ++counters_.prunes;
 }
 
@@ -274,6 +275,7 @@ void Simulation::rebuild_from(const PairHistories& pairs, const std::vector<Plat
   remember(at_rebuild_, drift_at_rebuild_);
   remember(at_prune_, drift_at_prune_);
   plane_moved_ = 0.0;
+  moved_since_prune_ = false;
   lists_valid_ = true;
   ++counters_.rebuilds;
   counters_.batches = static_cast<int>(batches_.size());

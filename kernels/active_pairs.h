@@ -56,7 +56,7 @@ class GatheredPairs {
         const int at = active.at[m] + __builtin_ctz(lanes);
         const std::int32_t k = start + at;
         chunk.move(n, at);
-        from_[n] = k, i_[n] = b.i[k], row_j_[n] = b.row_j[k], to_j_[n] = b.to_j[k];
+        from_[n] = k, i_[n] = b.i[k], row_j_[n] = b.row_j[k], to_[n].partner = b.to[k].partner;
         tx_[n] = b.tx[k], ty_[n] = b.ty[k], tz_[n] = b.tz[k];
         if constexpr (scene.plasticity) sp_[n] = b.sp[k];
         if constexpr (scene.exponent != Exponent::one) k_t_last_[n] = b.k_t_last[k];
@@ -68,15 +68,15 @@ class GatheredPairs {
     for (; n % I::width != 0; ++n) {  // never entered with n = 0, so that n - 1 is a pair
       chunk.move(n, n - 1);
       chunk.delta[n] = -1.0;
-      i_[n] = i_[n - 1], row_j_[n] = row_size * i_[n], to_j_[n] = record_bytes * (i_[n] - b.first);
+      i_[n] = i_[n - 1], row_j_[n] = row_size * i_[n], to_[n].partner = record_bytes * (i_[n] - b.first);
       tx_[n] = ty_[n] = tz_[n] = sp_[n] = k_t_last_[n] = 0.0;
     }
-    find_owner_runs(i_, n, b.first, b.spare, again_, to_last_);
+    find_owner_runs(i_, n, b.first, b.spare, to_);
   }
 
   PairBatch view(const PairBatch& b) {
     PairBatch v = b;
-    v.i = i_, v.row_j = row_j_, v.to_j = to_j_, v.to_last = to_last_, v.again = again_;
+    v.i = i_, v.row_j = row_j_, v.to = to_;
     v.tx = tx_, v.ty = ty_, v.tz = tz_, v.sp = sp_, v.k_t_last = k_t_last_;
     return v;
   }
@@ -93,8 +93,8 @@ class GatheredPairs {
  private:
   using Column = typename Chunk<scene>::Column;
   alignas(64) Column tx_, ty_, tz_, sp_, k_t_last_;
-  alignas(64) std::int32_t from_[chunk_size], i_[chunk_size], row_j_[chunk_size], to_j_[chunk_size], to_last_[chunk_size];
-  std::uint8_t again_[chunk_size];
+  alignas(64) std::int32_t from_[chunk_size], i_[chunk_size], row_j_[chunk_size];
+  alignas(64) PairTargets to_[chunk_size];
   int count_ = 0;
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "kernels/chunk.h"
+#include "kernels/owner_runs.h"
 #include "kernels/rounding.h"
 
 namespace platen {
@@ -24,10 +25,11 @@ PLATEN_INLINE void output_pairs(const Chunk<scene>& chunk, int at, const PairBat
     I::to_records(fields, records[side]);
   }
   for (int lane = 0; lane < I::width; ++lane) {
-    double* last = record_at(b.sum, b.to_last[k + lane]);
+    const PairTargets to = b.to[k + lane];
+    double* last = record_at(b.sum, last_of(to));
     I::store_record(last, I::add(I::load_record(last), carried));
-    carried = I::add_if(b.again[k + lane], carried, records[0][lane]);
-    double* partner = record_at(b.sum, b.to_j[k + lane]);
+    carried = I::add_if(again_of(to), carried, records[0][lane]);
+    double* partner = record_at(b.sum, to.partner);
     I::store_record(partner, I::add_reaction(I::load_record(partner), records[Chunk<scene>::sides - 1][lane]));
   }
 }

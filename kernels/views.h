@@ -67,15 +67,21 @@ struct LawConstants {
 //   contact:      0      1      2      3     4   ...
 //   i             17     17     17     18    20  ...   owner side: particle of this batch
 //   row_j         216    300    10836  300   252 ...   row of the partner j, any particle: 12 j, in doubles from `rows`
-//   to_j          64     512    32768  512   256 ...   where j's share goes, in bytes from `sum`: an own particle, or a halo slot
-//   again         -      all    all    -     -         all bits where the owner is that of the contact before
-//   to_last       spare  spare  spare  0     64  ...   where the owner is another one: record of that of the contact before
+//   to.partner    64     512    32768  512   256 ...   where j's share goes, in bytes from `sum`: an own particle, or a halo slot
+//   to.last       spare  spare  spare  0     64  ...   where the owner is another one: the record of that of the contact before
 //
 // Bytes, because an address that takes a multiplication costs a tenth of the output phase.
+struct PairTargets {
+  std::int32_t partner;
+  // Four times the place of `last`, and the lowest eight bits set where the owner is that of the contact before: one array less
+  // to follow, of which a processor can only follow so many.
+  std::int32_t last_and_again;
+};
+
 struct PairBatch {
   const double* rows;
-  const std::int32_t *i, *row_j, *to_j, *to_last;
-  const std::uint8_t* again;
+  const std::int32_t *i, *row_j;
+  const PairTargets* to;
   double *sp, *tx, *ty, *tz;
   double* k_t_last;     // exponent other than 1: k_t of the step before; null otherwise
   double* sum;          // records: of own particles, halo slots, spare ones
@@ -137,6 +143,7 @@ struct MotionConstants {
   double mu_r;             // of pairs
   double inverse_mass, mass, radius, inverse_radius;  // equal spheres
   double width, depth;     // periodic lengths; 0 where not periodic
+  double strongest2;       // records of spheres that are pushed harder are left as they are; squared [N2]
   double mean_x, mean_y, mean_z;  // common velocity taken out of the displacement bound
   Quantum energy;
 };
@@ -147,6 +154,8 @@ struct MotionBatch {
   double* rows;            // of this batch's first particle
   std::int32_t* image;     // 2 per particle
   const double* sum;       // records: the forces
+  double* cleared;         // records that are set to zero behind the particles: those of `sum`, or one other
+  std::int64_t cleared_step;    // from one to the next, in doubles; 0 where it is one other
   const double* inverse_room2;  // 1/(how far a particle may move until the lists must be looked at)^2 [1/m2]
   std::int32_t count;      // multiple of padding
 };

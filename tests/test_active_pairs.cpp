@@ -20,19 +20,20 @@ constexpr double leap = 2e-6;  // [m]
 // A chunk of pairs that are apart, with their geometry and what is remembered numbered by pair.
 struct Sample {
   Chunk<scene> chunk{};
-  std::vector<std::int32_t> i, row_j, to_j;
+  std::vector<std::int32_t> i, row_j;
+  std::vector<PairTargets> to;
   std::vector<double> sp, tx, ty, tz, k_t_last;
   PairBatch batch{};
 
-  Sample() : i(chunk_size), row_j(chunk_size), to_j(chunk_size), sp(chunk_size), tx(chunk_size), ty(chunk_size), tz(chunk_size), k_t_last(chunk_size) {
+  Sample() : i(chunk_size), row_j(chunk_size), to(chunk_size), sp(chunk_size), tx(chunk_size), ty(chunk_size), tz(chunk_size), k_t_last(chunk_size) {
     for (int k = 0; k < chunk_size; ++k) {
       const auto at = static_cast<std::size_t>(k);
-      i[at] = 100 + k / 3, row_j[at] = row_size * (1000 + k), to_j[at] = record_bytes * (500 + k);
+      i[at] = 100 + k / 3, row_j[at] = row_size * (1000 + k), to[at].partner = record_bytes * (500 + k);
       chunk.delta[k] = -1e-4, chunk.inverse[k] = 100.0 + k;
       for (int axis = 0; axis < 3; ++axis) chunk.n[axis][k] = 10 * k + axis;
       for (int side = 0; side < 2; ++side) chunk.R[side][k] = 2 + k + 0.1 * side;
     }
-    batch.i = i.data(), batch.row_j = row_j.data(), batch.to_j = to_j.data();
+    batch.i = i.data(), batch.row_j = row_j.data(), batch.to = to.data();
     batch.sp = sp.data(), batch.tx = tx.data(), batch.ty = ty.data(), batch.tz = tz.data(), batch.k_t_last = k_t_last.data();
     batch.first = 100, batch.count = chunk_size, batch.spare = record_bytes * 900, batch.leap = leap;
   }
@@ -91,7 +92,7 @@ TEST(ActivePairs, AreGatheredWhereFew) {
     for (int side = 0; side < 2; ++side) EXPECT_EQ(s.chunk.R[side][n], before.R[side][k]);
     EXPECT_EQ(view.i[n], 100 + k / 3);
     EXPECT_EQ(view.row_j[n], row_size * (1000 + k));
-    EXPECT_EQ(view.to_j[n], record_bytes * (500 + k));
+    EXPECT_EQ(view.to[n].partner, record_bytes * (500 + k));
     EXPECT_EQ(view.sp[n], k + 0.5);
     EXPECT_EQ(view.ty[n], -k);
     EXPECT_EQ(view.k_t_last[n], k == 62 ? 5.0 : 0.0);
@@ -115,7 +116,7 @@ TEST(ActivePairs, AreFilledUpWithPairsThatAreApart) {
   EXPECT_LT(s.chunk.delta[3], 0.0);
   EXPECT_EQ(view.i[3], view.i[2]);                  // the owner's sum goes on
   EXPECT_EQ(view.row_j[3], row_size * view.i[3]);           // a pair with itself, which has no distance and is masked
-  EXPECT_EQ(view.to_j[3], record_bytes * (view.i[3] - 100));  // and nothing is added to it
+  EXPECT_EQ(view.to[3].partner, record_bytes * (view.i[3] - 100));  // and nothing is added to it
   for (const double* column : {view.sp, view.tx, view.ty, view.tz, view.k_t_last}) EXPECT_EQ(column[3], 0.0);
 }
 
@@ -131,8 +132,8 @@ TEST(ActivePairs, RunsOfOneOwnerAmongThem) {
   const bool again[] = {false, true, false, false, true, false};
   const int before[] = {-1, -1, 101, 107, -1, 113};  // owner whose sum is complete; none: a spare record
   for (int n = 0; n < 6; ++n) {
-    EXPECT_EQ(view.again[n], again[n] ? 0xff : 0);
-    EXPECT_EQ(view.to_last[n], record_bytes * (before[n] < 0 ? 900 + n % spare_records : before[n] - 100));
+    EXPECT_EQ(again_of(view.to[n]), again[n] ? 0xff : 0);
+    EXPECT_EQ(last_of(view.to[n]), record_bytes * (before[n] < 0 ? 900 + n % spare_records : before[n] - 100));
   }
 }
 
