@@ -42,6 +42,7 @@ std::vector<BenchScene> bench_scenes() {
   not_rolling.rolling_friction = 0.0;
   add("no_rolling", not_rolling, as_it_is);
   add("no_energy", full, [](BenchScene& s) { s.energy = false; });
+  add("linear_no_energy", linear_law(), [](BenchScene& s) { s.energy = false; });
   add("no_plates", full, [](BenchScene& s) { s.plates = false, s.gravity = 0.0; });
   add("open", full, [](BenchScene& s) { s.periodic = false; });
   add("walls", full, [](BenchScene& s) { s.periodic = false, s.walls = true; });
@@ -64,6 +65,7 @@ std::vector<BenchScene> bench_scenes() {
   add("reproducible", full, [](BenchScene& s) { s.reproducible = true; });
   const auto rain = [](BenchScene& s) { s.top = false; };
   add("rain", linear_law(), rain);
+  add("rain_no_energy", linear_law(), [](BenchScene& s) { s.top = false, s.energy = false; });
   add("rain_full", full, rain);
   return all;
 }

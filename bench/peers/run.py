@@ -24,7 +24,8 @@ HERE = pathlib.Path(__file__).resolve().parent
 # peer: program, deck, then for each kind of bed the neighbour skin [m] and the scenes of platen that it is held against
 PEERS = {
     "lammps": dict(program="lmp", deck="lammps.in", law="linear spring, friction",
-                   dense=("1.25e-4", ["full", "linear"]), rain=("6e-4", ["rain", "rain_full"])),
+                   dense=("1.25e-4", ["full", "linear", "linear_no_energy"]),
+                   rain=("6e-4", ["rain", "rain_no_energy", "rain_full"])),
     "liggghts": dict(program="liggghts", deck="liggghts.in", law="EEPA, friction, rolling",
                      dense=("1.25e-4", ["full"]), rain=("6e-4", ["rain_full"])),
 }
