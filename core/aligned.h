@@ -91,12 +91,8 @@ class AlignedArray {
 
  private:
   // An array of its own takes whole huge pages: half a page too much on average, which is little from eight pages on.
-  static constexpr std::size_t huge_page = std::size_t{1} << 21, smallest_pooled = 2048, largest_pooled = 8 * huge_page;
-#if defined(__SANITIZE_ADDRESS__)
-  static constexpr bool pools = false;  // AddressSanitizer guards blocks of its own
-#else
-  static constexpr bool pools = true;
-#endif
+  static constexpr std::size_t huge_page = std::size_t{1} << 21, smallest_pooled = 2048;
+  static_assert(largest_pooled == 8 * huge_page);
   void release() {
     if (pooled_ > 0)
       give_to_pool({block_, pooled_});

@@ -36,7 +36,7 @@ struct Batch {
   std::int32_t first = 0, count = 0;
   int colour = 0;
 
-  std::vector<std::int32_t> outer_i, outer_j;
+  PooledVector<std::int32_t> outer_i, outer_j;
 
   std::int32_t used = 0, padded = 0;  // pairs of the inner list
   AlignedArray<std::int32_t> i, row_j;  // kernels/views.h

@@ -137,7 +137,7 @@ PairHistories pair_history(const std::vector<Batch>& batches, const Particles& p
   });
   for (std::size_t k = 1; k < all.start.size(); ++k) all.start[k] += all.start[k - 1];
   all.pairs.resize(static_cast<std::size_t>(all.start.back()));
-  std::vector<std::int32_t> next(all.start.begin(), all.start.end() - 1);
+  PooledVector<std::int32_t> next(all.start.begin(), all.start.end() - 1);
   for_each([&](const Batch& b, std::size_t k, std::int32_t ri, std::int32_t rj) {
     const double sign = ri < rj ? 1.0 : -1.0;
     const std::int32_t low = std::min(ri, rj), at = next[static_cast<std::size_t>(low)]++;

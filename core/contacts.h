@@ -30,8 +30,8 @@ struct PlateHistory {
 
 // All pairs with history, in buckets by their lower rank.
 struct PairHistories {
-  std::vector<std::int32_t> start;  // bucket of rank r: pairs start[r] .. start[r + 1]
-  std::vector<PairHistory> pairs;
+  PooledVector<std::int32_t> start;  // bucket of rank r: pairs start[r] .. start[r + 1]
+  PooledVector<PairHistory> pairs;
 };
 
 PairHistories pair_history(const std::vector<Batch>& batches, const Particles& particles);

@@ -94,7 +94,7 @@ class Sweep {
 std::vector<std::int32_t> morton_order(const Particles& particles, int layer) {
   const auto n = static_cast<std::size_t>(particles.count);
   const Sweep sweep(particles, std::max(layer, 1));
-  std::vector<std::uint64_t> keys(n), other_keys(n);
+  PooledVector<std::uint64_t> keys(n), other_keys(n);
   std::vector<std::int32_t> order(n), other_order(n);
   for (std::size_t k = 0; k < n; ++k) keys[k] = sweep.key(k), order[k] = static_cast<std::int32_t>(k);
   constexpr int digit_bits = 11, passes = (Sweep::inside_bits + Sweep::layer_bits + Sweep::bar_bits) / digit_bits;

@@ -60,7 +60,7 @@ class CellGrid {
     }
     for (std::size_t c = 1; c < start_.size(); ++c) start_[c] += start_[c - 1];
     members_.resize(static_cast<std::size_t>(p.count));
-    std::vector<std::int32_t> next(start_.begin(), start_.end() - 1);
+    PooledVector<std::int32_t> next(start_.begin(), start_.end() - 1);
     for (std::int32_t k = 0; k < p.count; ++k) {
       const double* row = p.rows.data() + row_size * static_cast<std::size_t>(k);
       const auto at = static_cast<std::size_t>(next[static_cast<std::size_t>(cell_of_[static_cast<std::size_t>(k)])]++);
@@ -124,8 +124,8 @@ class CellGrid {
   bool wraps_[3];
   double low_[3], inverse_[3], lengths_[3];
   int cells_[3];
-  std::vector<std::int32_t> start_, cell_of_;
-  std::vector<Member> members_;
+  PooledVector<std::int32_t> start_, cell_of_;
+  PooledVector<Member> members_;
 };
 
 // Greedy colouring of the batches: no two that share a pair get the same colour.
@@ -202,8 +202,7 @@ std::vector<Batch> make_batches(const Particles& p, const Domain& domain, const 
     Batch& batch = batches[static_cast<std::size_t>(k)];
     std::vector<char> seen(static_cast<std::size_t>(count), 0);
     std::vector<std::int32_t> close;  // partners of one particle; grows to the most candidates that one had
-    std::vector<std::int32_t>& to_i = batch.outer_i;
-    std::vector<std::int32_t>& to_j = batch.outer_j;
+    PooledVector<std::int32_t> to_i, to_j;
     to_i.reserve(static_cast<std::size_t>(batch.count) * 8), to_j.reserve(static_cast<std::size_t>(batch.count) * 8);
     for (std::int32_t i = batch.first; i < std::min(batch.first + batch.count, p.count); ++i) {
       const double own = p.radius_of(i) + margins.of[static_cast<std::size_t>(i)];
@@ -223,6 +222,7 @@ std::vector<Batch> make_batches(const Particles& p, const Domain& domain, const 
       to_i.insert(to_i.end(), kept, i);
       to_j.insert(to_j.end(), close.begin(), close.begin() + static_cast<std::ptrdiff_t>(kept));
     }
+    batch.outer_i.assign(to_i.begin(), to_i.end()), batch.outer_j.assign(to_j.begin(), to_j.end());  // no longer than they need be
     for (int other = 0; other < count; ++other)
       if (other != k && seen[static_cast<std::size_t>(other)]) batch.partners.push_back(other);
   });
@@ -238,7 +238,6 @@ std::vector<Batch> make_batches(const Particles& p, const Domain& domain, const 
       batch.outer_j[kept++] = j;
     }
     batch.outer_i.resize(kept), batch.outer_j.resize(kept);
-    batch.outer_i.shrink_to_fit(), batch.outer_j.shrink_to_fit();
   });
   for (int k = 0; k < count; ++k) {
     Batch& batch = batches[static_cast<std::size_t>(k)];

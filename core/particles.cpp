@@ -22,18 +22,18 @@ void Particles::resize(std::int32_t n, bool equal_spheres) {
 
 namespace {
 template <class Array>
-void reorder(Array& column, const std::vector<std::int32_t>& order, std::vector<double>& scratch) {
+void reorder(Array& column, const std::vector<std::int32_t>& order, PooledVector<double>& scratch) {
   for (std::size_t k = 0; k < order.size(); ++k) scratch[k] = column[static_cast<std::size_t>(order[k])];
   for (std::size_t k = 0; k < order.size(); ++k) column[k] = scratch[k];
 }
 }  // namespace
 
 void Particles::permute(const std::vector<std::int32_t>& order) {
-  std::vector<double> scratch(order.size());
+  PooledVector<double> scratch(order.size());
   for (auto* column : {&x, &y, &z, &vx, &vy, &vz, &ux, &uy, &uz}) reorder(*column, order, scratch);
   if (!equal)
     for (auto* column : {&radius, &inverse_radius, &mass, &inverse_mass}) reorder(*column, order, scratch);
-  std::vector<std::int32_t> ranks(order.size()), images(2 * order.size());
+  PooledVector<std::int32_t> ranks(order.size()), images(2 * order.size());
   for (std::size_t k = 0; k < order.size(); ++k) {
     const auto from = static_cast<std::size_t>(order[k]);
     ranks[k] = rank[from];

@@ -340,7 +340,7 @@ std::uint64_t Simulation::state_hash(const std::string& extra) {
     for (const auto* column : {&p.x, &p.y, &p.z, &p.vx, &p.vy, &p.vz, &p.ux, &p.uy, &p.uz}) number((*column)[k]);
     put(p.image.data() + 2 * k, 2 * sizeof(std::int32_t));
   }
-  std::vector<PairHistory> pairs = pair_history(batches_, particles_).pairs;
+  PooledVector<PairHistory> pairs = pair_history(batches_, particles_).pairs;
   std::sort(pairs.begin(), pairs.end(),
             [](const PairHistory& a, const PairHistory& b) { return std::tie(a.low, a.high) < std::tie(b.low, b.high); });
   for (const PairHistory& h : pairs) {

@@ -29,7 +29,8 @@ SimulationState Simulation::whole_state() {
     s.image.insert(s.image.end(), {p.image[2 * k], p.image[2 * k + 1]});
   }
   s.sums.assign(sums.data(), sums.data() + sums.size());
-  s.pairs = pair_history(batches_, p).pairs;
+  const PairHistories pairs = pair_history(batches_, p);
+  s.pairs.assign(pairs.pairs.begin(), pairs.pairs.end());
   std::sort(s.pairs.begin(), s.pairs.end(), [](const PairHistory& a, const PairHistory& b) { return std::tie(a.low, a.high) < std::tie(b.low, b.high); });
   s.plates = plate_history(batches_, p);
   s.planes = planes_;
@@ -77,7 +78,7 @@ void Simulation::take_up(const SimulationState& s) {
   pairs.start.assign(n + 1, 0);
   for (const PairHistory& h : s.pairs) ++pairs.start[static_cast<std::size_t>(h.low) + 1];
   for (std::size_t k = 1; k <= n; ++k) pairs.start[k] += pairs.start[k - 1];
-  pairs.pairs = s.pairs;
+  pairs.pairs.assign(s.pairs.begin(), s.pairs.end());
   AlignedArray<double> sums;
   sums.resize(s.sums.size());
   std::copy(s.sums.begin(), s.sums.end(), sums.data());
