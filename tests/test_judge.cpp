@@ -63,6 +63,60 @@ TEST(Judge, AScanNeedsAnUncertaintyThatMeansSomething) {
   EXPECT_EQ(verdict_of(std::nullopt).holds, false);
 }
 
+// S2 with beds whose porosity falls in a straight line with stress, the unscaled ones 1.5 times as steeply. `special`: the
+// unscaled bed has keys of its own, as a gravity that is scaled too; `plain`: there is one without.
+std::vector<Statement> similarity_of(bool special, bool plain, double steepness) {
+  Study study;
+  study.strain_zero = 5e3;
+  PlannedPart planned;
+  planned.study = &study, planned.reference_radius = 2e-3;
+  std::vector<double> slopes;
+  const auto add = [&](const std::string& name, double stiffness, double slope, const std::vector<std::string>& set) {
+    CurveSpec spec;
+    spec.name = name, spec.set = set;
+    study.curves.push_back(spec);
+    PlannedCurve curve;
+    curve.label = curve.block = name, curve.radius = 3e-3, curve.powers.stiffness = stiffness;
+    planned.curves.push_back(curve);
+    slopes.push_back(slope);
+  };
+  add("scaled", 1.0, 1.0, {});
+  if (special) add("unscaled, gravity scaled", 0.0, steepness, {"environment.gravity=6.54"});
+  if (plain) add("unscaled", 0.0, 2.0, {});
+  PartResults part;
+  part.plan = &planned;
+  for (std::size_t k = 0; k < slopes.size(); ++k) {
+    MeasuredCurve curve;
+    curve.planned = &planned.curves[k];
+    for (const double scatter : {-1e-3, 1e-3}) {
+      RunMeasures run;
+      for (double stress = 0.0; stress <= 60e3; stress += 1e3) {
+        run.curves["porosity"].x.push_back(stress);
+        run.curves["porosity"].y.push_back(0.4 - (slopes[k] + scatter) * 1e-6 * stress);
+      }
+      curve.runs.push_back(run);
+    }
+    part.curves.push_back(curve);
+  }
+  std::vector<Statement> said;
+  Judge judge(part, said);
+  judge_similarity_2(judge);
+  return said;
+}
+
+TEST(Judge, TakesAnUnscaledBedWithKeysOfItsOwnWhereThereIsNoPlainOne) {
+  const auto holds = [](bool special, bool plain, double steepness) {
+    const auto said = similarity_of(special, plain, steepness);
+    EXPECT_EQ(said.size(), 1u);
+    return said.empty() ? std::nullopt : said.front().holds;
+  };
+  EXPECT_EQ(holds(true, false, 1.5), true) << "1.5 times as steep over stresses 1.5 times smaller";
+  EXPECT_EQ(holds(true, false, 1.6), false);
+  EXPECT_EQ(holds(true, true, 1.5), false) << "the plain one counts, twice as steep";
+  EXPECT_EQ(holds(false, true, 1.5), false);
+  EXPECT_EQ(holds(false, false, 1.5), std::nullopt) << "none at all";
+}
+
 // A curve without a single run must leave what needs it open, and nothing else changed.
 TEST(Judge, WhatHasNoRunsIsNotJudged) {
   const StudyFolder study(study_text, read_file(std::string(PLATEN_SOURCE_DIR) + "/protocol/cases/quick.toml"));
