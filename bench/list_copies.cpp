@@ -37,7 +37,7 @@ BatchCopy::BatchCopy(const Batch& b)
       tz(copy_of(b.tz)),
       k_t_last(copy_of(b.k_t_last)),
       sum(copy_of(b.sum)),
-      inverse_room2(static_cast<std::size_t>(b.count), 0.0),
+      speed2(static_cast<std::size_t>(b.count), 0.0),
       first(b.first),
       count(b.count),
       used(b.used),
@@ -95,7 +95,7 @@ MotionBatch BatchCopy::motion(StateCopy& s, bool clears) {
           sum.data(),
           clears ? sum.data() : nowhere.data(),
           clears ? record_size : 0,
-          inverse_room2.data(),
+          speed2.data(),
           count};
 }
 

@@ -35,7 +35,7 @@ struct BatchCopy {
   AlignedArray<std::int32_t> i, row_j;
   AlignedArray<PairTargets> targets;
   AlignedArray<double> sp, tx, ty, tz, k_t_last, sum;
-  std::vector<double> inverse_room2;  // none: nothing is watched
+  std::vector<double> speed2;
   AlignedArray<double> nowhere;
   std::int32_t first = 0, count = 0, used = 0, padded = 0;
   std::vector<Incoming> incoming;

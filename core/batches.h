@@ -58,7 +58,6 @@ struct Batch {
   std::int64_t plate_energy[term_count] = {};
   std::int64_t plate_work = 0;
   std::int64_t rolling = 0;
-  double path = 0.0;                  // over a run of steps: sum of the largest way of a step, in units of the room of who goes it
   // Largest speed of its spheres in the last motion, relative to the common velocity [m/s]; of the batches that list it as a
   // partner too. Places that fill up the last vector count as spheres at rest, which costs time in a bed that falls.
   double fastest = 0.0;

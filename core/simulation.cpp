@@ -251,7 +251,7 @@ void Simulation::integrate(Batch& b, const MotionConstants& c, bool keeps_sums) 
   const MotionBatch batch{column(p.x), column(p.y), column(p.z), column(p.vx), column(p.vy), column(p.vz), column(p.ux),
                           column(p.uy), column(p.uz), column(p.inverse_mass), column(p.mass), column(p.radius),
                           column(p.inverse_radius), p.rows.data() + row_size * first, p.image.data() + 2 * first,
-                          b.sum.data(), keeps_sums ? nowhere : b.sum.data(), keeps_sums ? 0 : record_size, room_.data() + first, b.count};
+                          b.sum.data(), keeps_sums ? nowhere : b.sum.data(), keeps_sums ? 0 : record_size, speed2_.data() + first, b.count};
   MotionTotals totals;
   kernels_.motion(batch, c, totals);
   // The places that fill up the last vector rest where they are.
@@ -260,7 +260,6 @@ void Simulation::integrate(Batch& b, const MotionConstants& c, bool keeps_sums) 
     for (auto* a : {&p.x, &p.y, &p.z, &p.vx, &p.vy, &p.vz, &p.ux, &p.uy, &p.uz}) (*a)[k] = 0.0;
     p.image[2 * k] = p.image[2 * k + 1] = 0;
   }
-  b.path += std::sqrt(totals.largest_pace) * c.drift;
   b.fastest = std::sqrt(totals.fastest2);
   b.rolling += totals.rolling;
   b.out_of_range = b.out_of_range || totals.out_of_range;
@@ -371,7 +370,6 @@ void Simulation::collect() {
 }
 
 void Simulation::run_chunk(int steps) {
-  for (Batch& b : batches_) b.path = 0.0;
   law_.dt = plate_law_.dt = dt_;
   motion_.kick = motion_.drift = dt_;
   motion_.mean_x = mean_[0], motion_.mean_y = mean_[1], motion_.mean_z = mean_[2];
@@ -403,15 +401,12 @@ void Simulation::advance(std::int64_t steps) {
     const int n = prepare_lists(std::min<std::int64_t>(steps, one_by_one ? 1 : at_most));
     save();
     run_chunk(n);
-    double path = 0.0;
     bool bad = false;
-    for (const Batch& b : batches_) {
-      path = std::max(path, b.path);
-      bad = bad || b.out_of_range;
-    }
+    for (const Batch& b : batches_) bad = bad || b.out_of_range;
     // Did the lists hold? If not, a pair may have been missed, and a force out of range may be its consequence: from the
     // saved state once more with wider lists. Lists change no bits, so nobody sees it.
-    if (std::isfinite(path) && path > 1.0) {
+    const Ways ways = look_back(n);
+    if (ways == Ways::too_long) {
       double fastest = 0.0;
       for (std::size_t k = 0; k < static_cast<std::size_t>(particles_.count); ++k) fastest = std::max(fastest, own_speed(k));
       const bool known = std::isfinite(fastest);
@@ -427,7 +422,7 @@ void Simulation::advance(std::int64_t steps) {
     }
     at_most = engine_.unroll;
     redo_margin_ = 0.0;
-    if (bad || !std::isfinite(path)) {
+    if (bad || ways == Ways::no_number) {
       if (n > 1) {  // once more step by step, so that the message tells where it began
         restore();
         one_by_one = true;

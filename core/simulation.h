@@ -171,6 +171,9 @@ class Simulation {
   void check_speeds();
   bool choose_margins(bool fresh);
   int look(int wanted);
+  enum class Ways { within_margins, too_long, no_number };  // of spheres in a run of steps
+  Ways look_back(int steps) const;
+  bool unlisted_apart(int steps, const std::vector<char>& beyond) const;
   void remember(AlignedArray<double>& reference, double (&drift)[3]);
   int prepare_lists(std::int64_t wanted);
   double plane_path(int steps) const;
@@ -217,7 +220,8 @@ class Simulation {
 
   // Lists.
   Margins inner_, outer_;
-  AlignedArray<double> room_;                   // 1/(what each sphere may still move)^2 [1/m2]
+  AlignedArray<double> room_;                   // what each sphere may still move [m]
+  AlignedArray<double> speed2_;                 // of each sphere: sum over a run of steps of |v - mean_|^2 [m2/s2]
   double plate_gap_ = 0.0;                      // bound of the planes' motion that lists allow [m]
   double redo_margin_ = 0.0;                    // least margin after steps had to be done again [m]
   double kick_factor_ = 1.0;                    // on the mean speed, for spheres that will be hit

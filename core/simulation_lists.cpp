@@ -1,6 +1,7 @@
 // Lists of a Simulation: when they are made anew and how wide, and the state to which a run of steps can go back.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/float_mode.h"
 #include "core/morton_order.h"
@@ -14,7 +15,7 @@ constexpr double smallest_inner = 0.003, smallest_outer = 0.08;
 constexpr double widest = 0.5;
 constexpr double caution = 1.2;           // speeds may grow until the lists are looked at again
 constexpr int shortest_horizon = 16, longest_horizon = 512;  // steps from prune to prune
-constexpr int outer_life = 8;             // horizons from rebuild to rebuild of a bed in steady motion
+constexpr int outer_life = 16;             // horizons from rebuild to rebuild of a bed in steady motion
 constexpr int worthwhile = 8;             // steps that lists must still hold, lest they are made anew
 // What it costs to look at a pair in the kernel, at a pair of the outer list in a prune, and a prune for each sphere.
 constexpr double pair_cost = 10.0, outer_cost = 3.0, sphere_cost = 20.0;
@@ -189,19 +190,21 @@ bool Simulation::choose_margins(bool fresh) {
 // room that each sphere has left, which the steps watch.
 int Simulation::look(int wanted) {
   room_.resize(static_cast<std::size_t>(particles_.padded));
+  speed2_.resize(static_cast<std::size_t>(particles_.padded));
   std::vector<double> tight(batches_.size(), 0.0), bare(batches_.size(), 0.0);
   parallel(static_cast<int>(batches_.size()), [&](int index) {
     const Batch& b = batches_[static_cast<std::size_t>(index)];
     double fastest = 0.0, smallest = 0.0;
     for (std::int32_t local = 0; local < b.count; ++local) {
       const auto k = static_cast<std::size_t>(b.first + local);
+      speed2_[k] = 0.0;
       if (b.first + local >= particles_.count) {  // what fills up the last vector
-        room_[k] = 0.0;
+        room_[k] = std::numeric_limits<double>::infinity();
         continue;
       }
       const double left = moved_since_prune_ ? inner_.of[k] - displacement(k, at_prune_, drift_at_prune_) : inner_.of[k];
       const double inverse = 1.0 / std::max(left, 1e-100);  // finite, so that no speed of 0 makes it not a number
-      room_[k] = inverse * inverse;
+      room_[k] = std::max(left, 0.0);
       fastest = std::max(fastest, own_speed(k) * inverse);
       smallest = std::max(smallest, inverse);
     }
@@ -215,6 +218,68 @@ int Simulation::look(int wanted) {
   int steps = wanted;
   while (steps > 0 && !holds(steps)) steps = steps > 1 ? steps * 3 / 4 : 0;
   return steps;
+}
+
+// Whether every sphere stayed within its margin in the last `steps` steps, or else could not have met one that it is not
+// listed with. The way of a sphere is at most dt sqrt(steps sum of v^2).
+Simulation::Ways Simulation::look_back(int steps) const {
+  const auto n = static_cast<std::size_t>(particles_.count);
+  const double factor = steps * dt_ * dt_;
+  std::size_t within = 0;
+  double sum = 0.0;  // a number only if all are
+  for (std::size_t k = 0; k < n; ++k) {
+    within += factor * speed2_[k] <= room_[k] * room_[k] ? 1u : 0u;
+    sum += speed2_[k];
+  }
+  if (!std::isfinite(sum)) return Ways::no_number;
+  if (within == n) return Ways::within_margins;
+  std::vector<char> beyond(n);
+  for (std::size_t k = 0; k < n; ++k) beyond[k] = !(factor * speed2_[k] <= room_[k] * room_[k]);
+  return unlisted_apart(steps, beyond) ? Ways::within_margins : Ways::too_long;
+}
+
+// Whether no pair and no sphere and plane that are not listed can have touched in the last `steps` steps, although spheres
+// went `beyond` their margins: most often it is one that was pushed, between others that hardly moved.
+bool Simulation::unlisted_apart(int steps, const std::vector<char>& beyond) const {
+  const auto n = static_cast<std::size_t>(particles_.count);
+  const double factor = (1.0 + 1e-9) * dt_ * std::sqrt(static_cast<double>(steps)), rounding = 1e-9 * largest_radius_;
+  // Since the prune: before these steps, and in them.
+  const auto way = [&](std::size_t k) { return std::max(0.0, inner_.of[k] - room_[k]) + factor * std::sqrt(speed2_[k]) + rounding; };
+  const auto at_prune = [&](std::size_t k, std::size_t axis) { return at_prune_[axis * n + k]; };
+  const double planes_moved = plane_moved_ + plane_path(steps);
+  for (std::size_t k = 0; k < n; ++k) {
+    if (!beyond[k]) continue;
+    double before[3];  // from rebuild to prune, relative to the common drift
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      before[axis] = at_prune(k, axis) - at_rebuild_[axis * n + k] - (drift_at_rebuild_[axis] - drift_at_prune_[axis]);
+    before[0] = domain_.nearest_x(before[0]), before[1] = domain_.nearest_y(before[1]);
+    if (!(std::hypot(before[0], before[1], before[2]) + way(k) <= outer_.of[k])) return false;
+    for (int plate = 0; plate < plate_count; ++plate) {
+      const PlaneMotion& plane = planes_[static_cast<std::size_t>(plate)];
+      if (!plane.present) continue;
+      const Plane shape = plane_shape(plate);
+      const double apart = shape.sign * (at_prune(k, static_cast<std::size_t>(shape.axis)) - plane.position_at(step_)) - particles_.radius_of(static_cast<std::int32_t>(k));
+      if (apart >= way(k) + 2.0 * planes_moved) continue;
+      const auto batch = std::find_if(batches_.begin(), batches_.end(), [&](const Batch& b) { return k < static_cast<std::size_t>(b.first + b.count); });
+      const PlateList& list = batch->plates[plate];
+      if (std::find(list.particle.begin(), list.particle.begin() + list.used, static_cast<std::int32_t>(k)) == list.particle.begin() + list.used) return false;
+    }
+  }
+  for (const Batch& b : batches_) {
+    std::size_t listed = 0;
+    for (std::size_t m = 0; m < b.outer_i.size(); ++m) {
+      if (listed < static_cast<std::size_t>(b.used) && b.from[listed] == static_cast<std::int32_t>(m)) {
+        ++listed;
+        continue;
+      }
+      const auto i = static_cast<std::size_t>(b.outer_i[m]), j = static_cast<std::size_t>(b.outer_j[m]);
+      if (!beyond[i] && !beyond[j]) continue;
+      const double dx = domain_.nearest_x(at_prune(i, 0) - at_prune(j, 0)), dy = domain_.nearest_y(at_prune(i, 1) - at_prune(j, 1));
+      const double apart = std::hypot(dx, dy, at_prune(i, 2) - at_prune(j, 2)) - particles_.radius_of(b.outer_i[m]) - particles_.radius_of(b.outer_j[m]);
+      if (!(way(i) + way(j) <= apart)) return false;
+    }
+  }
+  return true;
 }
 
 // Makes sure that the lists will hold for some steps, and says for how many: at most `wanted`.

@@ -13,7 +13,6 @@ template <class I, bool equal_spheres, bool rolling, bool energy, bool guarded =
 void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals& totals) noexcept {
   using Real = typename I::Real;
   const Real zero = I::set(0.0), kick = I::set(c.kick), drift = I::set(c.drift);
-  Real largest = zero;
   Real fastest = zero;    // speed, squared
   Real rolled = zero;
   Real squares = zero;    // of all velocities: not a number where one is none. Spins show in the contacts that they rub
@@ -86,12 +85,10 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
 
     const Vec3<I> excess = {v.x - I::set(c.mean_x), v.y - I::set(c.mean_y), v.z - I::set(c.mean_z)};
     const Real speed2 = dot(excess, excess);
-    largest = I::max(largest, speed2 * I::load(b.inverse_room2 + k));
+    I::store(b.speed2 + k, I::load(b.speed2 + k) + speed2);
     fastest = I::max(fastest, speed2);
     if constexpr (guarded) squares = squares + speed2;
   }
-  const double pace = I::largest(largest);
-  totals.largest_pace = totals.largest_pace > pace ? totals.largest_pace : pace;
   totals.fastest2 = I::largest(fastest);
   if constexpr (guarded) totals.out_of_range = totals.out_of_range || I::any(I::not_less(squares, I::set(0x1p60)));
   if constexpr (guarded) totals.strongest = I::largest(strongest);

@@ -144,7 +144,7 @@ struct MotionConstants {
   double inverse_mass, mass, radius, inverse_radius;  // equal spheres
   double width, depth;     // periodic lengths; 0 where not periodic
   double strongest2;       // records of spheres that are pushed harder are left as they are; squared [N2]
-  double mean_x, mean_y, mean_z;  // common velocity taken out of the displacement bound
+  double mean_x, mean_y, mean_z;  // common velocity, taken out of `speed2`
   Quantum energy;
 };
 
@@ -156,12 +156,11 @@ struct MotionBatch {
   const double* sum;       // records: the forces
   double* cleared;         // records that are set to zero behind the particles: those of `sum`, or one other
   std::int64_t cleared_step;    // from one to the next, in doubles; 0 where it is one other
-  const double* inverse_room2;  // 1/(how far a particle may move until the lists must be looked at)^2 [1/m2]
+  double* speed2;          // of each particle: |v - mean|^2 is added [m2/s2]
   std::int32_t count;      // multiple of padding
 };
 
 struct MotionTotals {
-  double largest_pace = 0.0;     // of |v - mean|^2 / room^2 [1/s2]
   double fastest2 = 0.0;         // largest |v - mean|^2 [m2/s2]
   double strongest = 0.0;        // largest force on a sphere, squared [N2]
   std::int64_t rolling = 0;      // rolling dissipation, quanta
