@@ -73,6 +73,7 @@ struct SimulationState;  // core/simulation_state.h
 
 struct EngineCounters {
   std::int64_t rebuilds = 0, prunes = 0, redone_steps = 0;
+  std::int64_t spared_steps = 0;  // not done again although spheres went beyond their margins
   int batches = 0;
   double skin = 0.0, gap = 0.0;  // of the lists, means over the spheres [m]
   std::int64_t bytes = 0;   // of the large arrays
@@ -172,7 +173,7 @@ class Simulation {
   bool choose_margins(bool fresh);
   int look(int wanted);
   enum class Ways { within_margins, too_long, no_number };  // of spheres in a run of steps
-  Ways look_back(int steps) const;
+  Ways look_back(int steps);
   bool unlisted_apart(int steps, const std::vector<char>& beyond) const;
   void remember(AlignedArray<double>& reference, double (&drift)[3]);
   int prepare_lists(std::int64_t wanted);

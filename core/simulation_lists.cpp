@@ -222,7 +222,7 @@ int Simulation::look(int wanted) {
 
 // Whether every sphere stayed within its margin in the last `steps` steps, or else could not have met one that it is not
 // listed with. The way of a sphere is at most dt sqrt(steps sum of v^2).
-Simulation::Ways Simulation::look_back(int steps) const {
+Simulation::Ways Simulation::look_back(int steps) {
   const auto n = static_cast<std::size_t>(particles_.count);
   const double factor = steps * dt_ * dt_;
   std::size_t within = 0;
@@ -235,7 +235,9 @@ Simulation::Ways Simulation::look_back(int steps) const {
   if (within == n) return Ways::within_margins;
   std::vector<char> beyond(n);
   for (std::size_t k = 0; k < n; ++k) beyond[k] = !(factor * speed2_[k] <= room_[k] * room_[k]);
-  return unlisted_apart(steps, beyond) ? Ways::within_margins : Ways::too_long;
+  if (!unlisted_apart(steps, beyond)) return Ways::too_long;
+  counters_.spared_steps += steps;
+  return Ways::within_margins;
 }
 
 // Whether no pair and no sphere and plane that are not listed can have touched in the last `steps` steps, although spheres
