@@ -154,6 +154,30 @@ TEST(Lists, NoPlateIsMissedByASphereThatIsPushed) {
   EXPECT_EQ(chunks.state_hash(), fresh.state_hash());
 }
 
+// The same onto spheres that are farther off than even the outer lists reach.
+TEST(Lists, NoSphereBeyondTheOuterListsIsMissedEither) {
+  BedOptions o;
+  o.nx = o.ny = 4, o.nz = 3, o.spacing = 3.0, o.speed = 0.0;
+  PairLaw law = stiff_law();
+  law.k2 = law.k1, law.k_adh = law.f0 = 0.0, law.restitution = 1.0;
+  SimulationSetup setup = scenes::bed(o, law, {});
+  setup.gravity = 0.0;
+  setup.engine.instruction_set = available_instruction_sets().back();
+  for (std::size_t k = 0; k < setup.spheres.id.size(); ++k)
+    setup.spheres.position[3 * k + 2] = k < 16 ? 2.0 * o.R : k < 32 ? 4.2 * o.R : 5.7 * o.R;
+  Simulation chunks(setup), fresh(setup);
+  for (Simulation* sim : {&chunks, &fresh}) sim->set_time_step(1.2e-6);
+  for (int step = 0; step < 32; ++step) {
+    fresh.rebuild_now();
+    fresh.advance(1);
+  }
+  chunks.advance(32);
+  std::size_t met = 0;
+  for (const auto& [low, high] : listed(fresh)) met += low < setup.spheres.id[16] && high >= setup.spheres.id[16] ? 1 : 0;
+  EXPECT_EQ(met, 16u) << "of the lowest layer";
+  EXPECT_EQ(chunks.state_hash(), fresh.state_hash());
+}
+
 // Steps done again leave no trace with several threads and in other laws either.
 TEST(Lists, StepsDoneAgainLeaveNoTrace) {
   for (const scenes::LawCase& c : scenes::laws_of_scenes()) {
