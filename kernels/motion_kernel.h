@@ -15,7 +15,6 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
   const Real zero = I::set(0.0), kick = I::set(c.kick), drift = I::set(c.drift);
   Real fastest = zero;    // speed, squared
   Real rolled = zero;
-  Real squares = zero;    // of all velocities: not a number where one is none. Spins show in the contacts that they rub
   Real strongest = zero;  // largest force on a sphere, squared
   for (std::int32_t k = 0; k < b.count; k += I::width) {
     typename I::Record records[I::width];
@@ -87,10 +86,8 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
     const Real speed2 = dot(excess, excess);
     I::store(b.speed2 + k, I::load(b.speed2 + k) + speed2);
     fastest = I::max(fastest, speed2);
-    if constexpr (guarded) squares = squares + speed2;
   }
   totals.fastest2 = I::largest(fastest);
-  if constexpr (guarded) totals.out_of_range = totals.out_of_range || I::any(I::not_less(squares, I::set(0x1p60)));
   if constexpr (guarded) totals.strongest = I::largest(strongest);
   if constexpr (energy && rolling) {
     const double total = I::sum(rolled);

@@ -164,7 +164,7 @@ struct MotionTotals {
   double fastest2 = 0.0;         // largest |v - mean|^2 [m2/s2]
   double strongest = 0.0;        // largest force on a sphere, squared [N2]
   std::int64_t rolling = 0;      // rolling dissipation, quanta
-  bool out_of_range = false;     // a velocity is not finite or absurd
+  bool out_of_range = false;     // an energy beyond its bound, or no number
 };
 
 }  // namespace platen
