@@ -147,9 +147,10 @@ int automatic_batch(std::int32_t particles, int threads, bool even) {
   // Fewer and larger batches have fewer pairs across and cost the graph less. Where work lies unevenly, or the colours of
   // many batches make it uneven, about three to eight for each thread even the load out, eight from 2,048 spheres each on,
   // where a task is long against what the graph takes for it. None has more than 20,000: larger ones were
-  // no faster [docs/decisions.md].
+  // no faster. Beds that no cache holds are run batch by batch in an order of their own, which needs small ones
+  // [core/task_order.h, docs/decisions.md].
   threads = std::max(1, threads);
-  const int largest = 20000, each = std::max(1, (particles + threads * largest - 1) / (threads * largest));
+  const int largest = particles > in_cache ? 2048 : 20000, each = std::max(1, (particles + threads * largest - 1) / (threads * largest));
   const int several = std::clamp(particles / 2048, 3 * threads, 8 * threads);
   const int count = threads == 1 || (threads == 2 && even) ? threads * each : std::max(threads * each, several);
   const int size = (particles + count - 1) / count;  // rounded up, or a last batch of a few spheres is left over

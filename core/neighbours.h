@@ -42,6 +42,9 @@ inline double distance2(const double* a, const double* b, const Domain& domain) 
 std::vector<Batch> make_batches(const Particles& particles, const Domain& domain, const Margins& margins, int size,
                                 const ParallelFor& parallel);
 
+// About as many particles, with their contacts, as the third cache of common processors holds.
+inline constexpr std::int32_t in_cache = 60000;
+
 // Particles in a batch where nothing else is asked for: enough batches for all threads, none too small to be worth a task.
 // `even`: equal stretches of the Morton curve are equal work; of interest to two threads only.
 int automatic_batch(std::int32_t particles, int threads, bool even);

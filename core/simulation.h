@@ -21,6 +21,7 @@
 #include "core/plates.h"
 #include "core/stability.h"
 #include "core/step_graph.h"
+#include "core/task_order.h"
 #include "kernels/kernel_table.h"
 #include "kernels/law_parameters.h"
 
@@ -55,6 +56,7 @@ struct EngineOptions {
   InstructionSet instruction_set = InstructionSet::scalar;
   Executor executor = Executor::automatic;
   bool fused = false;       // one task per batch and step instead of two
+  double cache = ordered_cache;  // that the order of tasks counts on in larger beds [bytes]
   std::function<void(TaskTable&)> tamper;  // for tests: changes every table of tasks before it is used
 };
 

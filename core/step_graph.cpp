@@ -90,6 +90,23 @@ TaskTable::TaskTable(const std::vector<Batch>& batches, int steps, bool fused) :
   }
 }
 
+void TaskTable::reorder(const std::vector<std::int32_t>& order) {
+  const std::size_t count = tasks_.size();
+  std::vector<std::int32_t> place(count);
+  for (std::size_t k = 0; k < count; ++k) place[static_cast<std::size_t>(order[k])] = static_cast<std::int32_t>(k);
+  std::vector<Task> tasks;
+  std::vector<std::vector<std::int32_t>> successors;
+  std::vector<std::int32_t> predecessors;
+  for (const std::int32_t t : order) {
+    const auto k = static_cast<std::size_t>(t);
+    tasks.push_back(tasks_[k]), predecessors.push_back(predecessors_[k]);
+    successors.push_back(std::move(successors_[k]));
+    for (std::int32_t& next : successors.back()) next = place[static_cast<std::size_t>(next)];
+  }
+  tasks_ = std::move(tasks), successors_ = std::move(successors), predecessors_ = std::move(predecessors);
+  ordered_ = true;
+}
+
 void TaskTable::remove_edge(std::int32_t from, std::int32_t to) {
   auto& list = successors_[static_cast<std::size_t>(from)];
   const auto it = std::find(list.begin(), list.end(), to);
@@ -111,8 +128,7 @@ std::string TaskTable::to_dot() const {
 
 void run_serially(const TaskTable& table, int steps, const TaskBody& body) {
   for (const Task& task : table.tasks()) {
-    if (task.offset >= steps) break;
-    body(task);
+    if (task.offset < steps) body(task);
   }
 }
 
@@ -128,7 +144,7 @@ void run_on_plain_threads(const TaskTable& table, int steps, const TaskBody& bod
   for (int worker = 0; worker < threads; ++worker) {
     team.emplace_back([&, worker] {
       for (std::size_t t = static_cast<std::size_t>(worker); t < count; t += static_cast<std::size_t>(threads)) {
-        if (table.tasks()[t].offset >= steps) break;
+        if (table.tasks()[t].offset >= steps) continue;
         for (std::int32_t p : before[t])
           while (!done[static_cast<std::size_t>(p)].load(std::memory_order_acquire)) std::this_thread::yield();
         body(table.tasks()[t]);
@@ -153,10 +169,11 @@ FlowGraph::FlowGraph(const TaskTable& table, TaskBody body) : graph_(std::make_u
   g.body = std::move(body);
   g.nodes.reserve(table.tasks().size());
   for (const Task& task : table.tasks()) {
+    const auto first = static_cast<tbb::flow::node_priority_t>(table.tasks().size() - g.nodes.size());
     g.nodes.push_back(std::make_unique<Graph::Node>(g.graph, [graph = graph_.get(), task](const tbb::flow::continue_msg&) {
       if (task.offset < graph->steps) graph->body(task);
       return tbb::flow::continue_msg();
-    }));
+    }, table.ordered() ? first : tbb::flow::no_priority));
   }
   for (std::size_t t = 0; t < table.tasks().size(); ++t) {
     for (std::int32_t next : table.successors()[t]) tbb::flow::make_edge(*g.nodes[t], *g.nodes[static_cast<std::size_t>(next)]);

@@ -46,13 +46,16 @@ class TaskTable {
   const std::vector<Task>& tasks() const { return tasks_; }
   const std::vector<std::vector<std::int32_t>>& successors() const { return successors_; }
   const std::vector<std::int32_t>& predecessors() const { return predecessors_; }  // their number
+  // Whether the order of the tasks is meant [core/task_order.h]; otherwise a graph takes whichever is ready.
+  bool ordered() const { return ordered_; }
+  void reorder(const std::vector<std::int32_t>& order);  // order[k] = task that comes k-th; must keep all edges
   std::vector<Access> accesses(const Task& task) const;
   void remove_edge(std::int32_t from, std::int32_t to);  // for tests that must see it missed
   std::string to_dot() const;                            // Graphviz
 
  private:
   int steps_;
-  bool fused_;
+  bool fused_, ordered_ = false;
   std::vector<std::vector<int>> partners_, owners_;  // of each batch
   std::vector<Task> tasks_;
   std::vector<std::vector<std::int32_t>> successors_;

@@ -98,6 +98,20 @@ TEST(Determinism, BatchSizes) {
     }
 }
 
+// The order of a bed that no cache holds [core/task_order.h].
+TEST(Determinism, OrdersForACache) {
+  for (const int threads : {1, 2, 3, 8})
+    for (const bool fused : {false, true})
+      for (const double cache : {1e4, 1e5}) {
+        EngineOptions engine;
+        engine.threads = threads, engine.fused = fused, engine.batch = 32, engine.cache = cache;
+        bool ordered = false;
+        engine.tamper = [&](TaskTable& table) { ordered = table.ordered(); };
+        expect_same(run(pressed_bed(engine), bed_steps), reference(), std::to_string(threads) + (fused ? " fused" : " split"));
+        EXPECT_TRUE(ordered);
+      }
+}
+
 TEST(Determinism, AutomaticBatches) {
   for (const int threads : {1, 2, 3}) {
     EngineOptions engine;

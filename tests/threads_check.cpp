@@ -1,7 +1,7 @@
 // A small bed on plain threads, for ThreadSanitizer: it cannot see through Debian's libtbb, which is built without it.
 //
-//   threads_check split|fused                clean, or ThreadSanitizer says what is wrong
-//   threads_check split|fused remove-edge    with one needed edge gone: ThreadSanitizer must report a race
+//   threads_check split|fused|ordered                clean, or ThreadSanitizer says what is wrong
+//   threads_check split|fused|ordered remove-edge    with one needed edge gone: ThreadSanitizer must report a race
 #include <cstdio>
 #include <cstring>
 
@@ -50,6 +50,7 @@ int main(int count, char** arguments) {
   engine.threads = threads, engine.executor = Executor::plain_threads, engine.batch = 16, engine.unroll = 8;
   engine.fused = std::strcmp(arguments[1], "fused") == 0;
   engine.instruction_set = preferred_instruction_set();
+  if (std::strcmp(arguments[1], "ordered") == 0) engine.cache = 1e4;
   if (count > 2 && std::strcmp(arguments[2], "remove-edge") == 0) engine.tamper = remove_a_needed_edge;
   try {
     Simulation sim(scenes::bed(bed, scenes::full_law(), engine));

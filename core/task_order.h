@@ -1,0 +1,34 @@
+// In which order the tasks of a bed that no cache holds are run.
+//
+// Step by step, every array comes from memory twice a step: once for the contacts, once for the integration. But a batch may go
+// on as soon as those around it are where it needs them. So those that a cache holds take several steps, and a wave goes through
+// the bed. For batches in a row, and steps instead of their two halves:
+//
+//     step 4 | 10                       number: when a task runs. Each needs three of the step before: its own batch's and
+//          3 |  6   9                   the neighbours'. Step by step all of the lowest row would come first.
+//          2 |  3   5   8
+//          1 |  1   2   4   7   11 ...
+//            +---a---b---c---d---e--->
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/step_graph.h"
+
+namespace platen {
+
+// Bytes of a cache that the order counts on: part of the third cache of common processors, since threads, other programs and what
+// the count leaves out want some too. More brings little.
+inline constexpr double ordered_cache = 12 << 20;
+
+// What a step touches of these batches [bytes].
+double touched_bytes(const std::vector<Batch>& batches);
+
+// An order of the table's tasks that keeps all edges: order[k] = task that comes k-th. Greedy: of the batches that may go on,
+// the one that needs least from memory in a cache of so many bytes, which forgets what was not touched for longest; among such the
+// one with most of its neighbours in the cache, since those let each other go on; then the one that is behind.
+// Takes about (tasks) x (batches in the cache and around it) operations.
+std::vector<std::int32_t> order_for_cache(const TaskTable& table, const std::vector<Batch>& batches, double bytes);
+
+}  // namespace platen

@@ -1,0 +1,155 @@
+// The order of tasks of beds that no cache holds [core/task_order.h].
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <list>
+#include <map>
+#include <mutex>
+#include <tuple>
+
+#include "core/task_order.h"
+#include "tests/scenes.h"
+
+namespace platen {
+namespace {
+
+using scenes::BedOptions;
+
+Simulation long_bed(int batch) {
+  BedOptions o;
+  o.nx = 40, o.ny = 6, o.nz = 7;
+  EngineOptions engine;
+  engine.batch = batch;
+  return Simulation(scenes::bed(o, scenes::full_law(), engine));
+}
+
+// All batches are about equally large: so many of them, states and contacts apart, that a cache takes in when it holds `places`
+// and forgets what was not used for longest.
+int loaded(const TaskTable& table, std::size_t places) {
+  std::list<int> held;  // last used first
+  int count = 0;
+  const auto use = [&](int what) {
+    const auto at = std::find(held.begin(), held.end(), what);
+    if (at == held.end())
+      ++count;
+    else
+      held.erase(at);
+    held.push_front(what);
+    if (held.size() > places) held.pop_back();
+  };
+  for (const Task& task : table.tasks()) {
+    use(2 * task.batch);
+    if (task.kind != TaskKind::integrate) use(2 * task.batch + 1);
+  }
+  return count;
+}
+
+TaskTable ordered(const Simulation& sim, int steps, bool fused, double cache) {
+  TaskTable table(sim.batches(), steps, fused);
+  table.reorder(order_for_cache(table, sim.batches(), cache));
+  return table;
+}
+
+TEST(TaskOrder, KeepsTasksAndEdges) {
+  for (const int batch : {16, 64, 4096}) {
+    Simulation sim = long_bed(batch);
+    sim.ensure_forces();
+    for (const bool fused : {false, true})
+      for (const double share : {0.0, 0.1, 0.5, 2.0}) {
+        const TaskTable plain(sim.batches(), 5, fused);
+        const std::vector<std::int32_t> order = order_for_cache(plain, sim.batches(), share * touched_bytes(sim.batches()));
+        std::vector<std::int32_t> sorted = order;
+        std::sort(sorted.begin(), sorted.end());
+        ASSERT_EQ(sorted.size(), plain.tasks().size());
+        for (std::size_t k = 0; k < sorted.size(); ++k) ASSERT_EQ(sorted[k], static_cast<std::int32_t>(k));
+
+        TaskTable table = plain;
+        table.reorder(order);
+        EXPECT_FALSE(plain.ordered());
+        EXPECT_TRUE(table.ordered());
+        for (std::size_t k = 0; k < order.size(); ++k) {
+          const auto t = static_cast<std::size_t>(order[k]);
+          EXPECT_EQ(table.tasks()[k].kind, plain.tasks()[t].kind);
+          EXPECT_EQ(table.tasks()[k].batch, plain.tasks()[t].batch);
+          EXPECT_EQ(table.tasks()[k].offset, plain.tasks()[t].offset);
+          EXPECT_EQ(table.predecessors()[k], plain.predecessors()[t]);
+          ASSERT_EQ(table.successors()[k].size(), plain.successors()[t].size());
+          for (std::size_t m = 0; m < table.successors()[k].size(); ++m) {
+            const std::int32_t next = table.successors()[k][m];
+            EXPECT_GT(next, static_cast<std::int32_t>(k));
+            EXPECT_EQ(order[static_cast<std::size_t>(next)], plain.successors()[t][m]);
+          }
+        }
+      }
+  }
+}
+
+TEST(TaskOrder, BringsLessFromMemory) {
+  Simulation sim = long_bed(64);
+  sim.ensure_forces();
+  const std::size_t batches = sim.batches().size();
+  ASSERT_GT(batches, 20u);
+  const int steps = 16;
+  const TaskTable plain(sim.batches(), steps, false);
+  // A third of all: step by step everything is brought in anew, states for each half of a step.
+  const std::size_t places = 2 * batches / 3;
+  EXPECT_EQ(loaded(plain, places), static_cast<int>(3 * batches) * steps);
+  const TaskTable table = ordered(sim, steps, false, touched_bytes(sim.batches()) / 3.0);
+  EXPECT_LT(loaded(table, places), loaded(plain, places) / 2);
+  // A cache that holds all has everything brought in once, in whatever order.
+  EXPECT_EQ(loaded(ordered(sim, steps, false, 1e12), 2 * batches), static_cast<int>(2 * batches));
+}
+
+TEST(TaskOrder, ABedThatFitsIsLeftInTheOrderOfSteps) {
+  BedOptions o;
+  o.nx = o.ny = o.nz = 6;
+  for (const bool fits : {true, false}) {
+    bool seen = false, was_ordered = false;
+    EngineOptions engine;
+    engine.batch = 16;
+    if (!fits) engine.cache = 1e4;
+    engine.tamper = [&](TaskTable& table) { seen = true, was_ordered = table.ordered(); };
+    Simulation sim(scenes::bed(o, scenes::full_law(), engine));
+    sim.ensure_forces();
+    EXPECT_TRUE(seen);
+    EXPECT_EQ(was_ordered, !fits);
+  }
+}
+
+TEST(TaskOrder, AGraphRunsEveryTaskOnceAndInOrder) {
+  Simulation sim = long_bed(64);
+  sim.ensure_forces();
+  const TaskTable table = ordered(sim, 6, false, touched_bytes(sim.batches()) / 4.0);
+  using Key = std::tuple<int, int, int>;
+  const auto key = [](const Task& task) { return Key(static_cast<int>(task.kind), task.batch, task.offset); };
+  for (const int steps : {1, 4, 6})
+    for (const int threads : {0, 1, 2, 3}) {
+      std::mutex mutex;
+      std::map<Key, int> place;
+      bool twice = false;
+      const TaskBody body = [&](const Task& task) {
+        const std::lock_guard<std::mutex> lock(mutex);
+        twice = !place.emplace(key(task), static_cast<int>(place.size())).second || twice;
+      };
+      if (threads == 0) {
+        FlowGraph(table, body).run(steps);
+      } else if (threads == 1) {
+        run_serially(table, steps, body);
+      } else {
+        run_on_plain_threads(table, steps, body, threads);
+      }
+      EXPECT_FALSE(twice);
+      EXPECT_EQ(place.size(), sim.batches().size() * 2 * static_cast<std::size_t>(steps));
+      for (std::size_t t = 0; t < table.tasks().size(); ++t) {
+        if (table.tasks()[t].offset >= steps) continue;
+        for (const std::int32_t next : table.successors()[t]) {
+          const Task& later = table.tasks()[static_cast<std::size_t>(next)];
+          if (later.offset >= steps) continue;
+          EXPECT_LT(place.at(key(table.tasks()[t])), place.at(key(later)));
+        }
+      }
+    }
+}
+
+}  // namespace
+}  // namespace platen
