@@ -57,6 +57,7 @@ int main(int argc, char** argv) {
            {"rebuilds", "the cost of making all lists anew"},
            {"phases", "where the time of a step goes"},
            {"schedule", "the graph on more cores than there are, simulated from measured task times"},
+           {"orders", "bytes that the order of a large bed's tasks brings from memory, by count"},
            {"one", "blocks of one scene as one JSON line"},
            {"one-rain", "the same for rain"},
            {"scenes", "lists the scenes"},
@@ -77,6 +78,7 @@ int main(int argc, char** argv) {
     if (mode == "rebuilds") table_of_rebuilds(options);
     if (mode == "phases") table_of_phases(options);
     if (mode == "schedule") table_of_schedules(options);
+    if (mode == "orders") table_of_orders(options);
     if (mode == "one") one_block(options, false);
     if (mode == "one-rain") one_block(options, true);
     if (mode == "scenes")

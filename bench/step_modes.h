@@ -54,6 +54,8 @@ void table_of_rebuilds(const StepOptions& options);
 void table_of_phases(const StepOptions& options);
 // How the graph would run on more cores, simulated.
 void table_of_schedules(const StepOptions& options);
+// What the order of a large bed's tasks saves, by count.
+void table_of_orders(const StepOptions& options);
 // One scene on one bed, one JSON line on standard output: for scripts that run other programs in turn with it.
 void one_block(const StepOptions& options, bool rain);
 

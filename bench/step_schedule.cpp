@@ -10,6 +10,7 @@
 #include "bench/parallel_for_step.h"
 #include "bench/step_modes.h"
 #include "core/step_graph.h"
+#include "core/task_order.h"
 
 namespace platen::bench {
 
@@ -91,7 +92,8 @@ void table_of_schedules(const StepOptions& o) {
       sim->rebuild_now();
       ParallelForStep tasks(*sim, scene.law, scene.gravity, 1);
       const std::vector<ParallelForStep::BatchTimes> times = tasks.times(40);
-      const TaskTable graph(sim->batches(), 32, false);
+      TaskTable graph(sim->batches(), 32, false);
+      order_if_large(graph, sim->batches(), ordered_cache);
       const double overhead = overhead_of_a_task(graph);
       std::vector<double> cost;
       for (const Task& task : graph.tasks()) {

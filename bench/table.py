@@ -70,6 +70,12 @@ def make(folder):
             ("particles", "contacts", "integrate", "lists and the saved copy", "whole step", "bytes moved", "GB/s", "ns if the third cache were all", "L2 / L3 GB/s"),
             [(f"{r['particles']:,}", number(r["contacts"]), number(r["integrate"]), number(r["lists"]), number(r["whole"]),
               number(r["bytes"], 0), number(r["GB/s"]), number(r["memory_bound"]), f"{number(r['l2'], 0)} / {number(r['l3'], 0)}") for r in rows]))
+    rows = rows_of(folder, "orders")
+    if rows:
+        parts.append("### Order of tasks of large beds: bytes from memory for each particle and step, counted in a model of a cache\n\n" + table(
+            ("particles", "batches", "touched", "MiB of cache", "in the order of steps", "in the order for a cache", "ms to find it"),
+            [(f"{r['particles']:,}", r["batches"], number(r["touched"], 0), number(r["cache_MiB"], 0), number(r["by_step"], 0),
+              number(r["ordered"], 0), number(r["milliseconds"], 1)) for r in rows]))
     rows = rows_of(folder, "schedule")
     if rows:
         parts.append("### More cores: simulated, not measured\n\nThe real graph with task times measured on one core; shared caches and "

@@ -93,7 +93,8 @@ class Sweep {
 
 std::vector<std::int32_t> morton_order(const Particles& particles, int layer) {
   const auto n = static_cast<std::size_t>(particles.count);
-  const Sweep sweep(particles, std::max(layer, 1));
+  const double section = std::pow(static_cast<double>(particles.count), 2.0 / 3.0);  // of a cube
+  const Sweep sweep(particles, layer > 0 ? layer : static_cast<int>(std::clamp(section / 9.0, 500.0, 1000.0)));
   PooledVector<std::uint64_t> keys(n), other_keys(n);
   std::vector<std::int32_t> order(n), other_order(n);
   for (std::size_t k = 0; k < n; ++k) keys[k] = sweep.key(k), order[k] = static_cast<std::int32_t>(k);

@@ -64,6 +64,7 @@ class Cache {
     const auto b = static_cast<std::size_t>(batch);
     return neighbours_[b].empty() ? 0.0 : near_[b] / static_cast<double>(neighbours_[b].size());
   }
+  double taken_in() const { return taken_in_; }
   void use(const Task& task) {
     const auto state = 2 * static_cast<std::size_t>(task.batch);
     touch(state);
@@ -75,6 +76,7 @@ class Cache {
   void touch(std::size_t what) {
     if (!holds(what)) {
       held_ += size_[what];
+      taken_in_ += size_[what];
       if (what % 2 == 0) tell_neighbours(static_cast<int>(what / 2), 1);
     }
     last_use_[what] = static_cast<std::int64_t>(uses_.size());
@@ -101,7 +103,7 @@ class Cache {
       around_.remove(b);
   }
 
-  double capacity_, held_ = 0.0;
+  double capacity_, held_ = 0.0, taken_in_ = 0.0;
   std::vector<double> size_;
   std::vector<std::int64_t> last_use_;  // place in uses_; -1: not held
   std::vector<std::size_t> uses_;
@@ -117,6 +119,12 @@ double touched_bytes(const std::vector<Batch>& batches) {
   double bytes = 0.0;
   for (const Batch& b : batches) bytes += state_bytes(b) + contact_bytes(b);
   return bytes;
+}
+
+double bytes_from_memory(const TaskTable& table, const std::vector<Batch>& batches, double bytes) {
+  Cache cache(batches, bytes);
+  for (const Task& task : table.tasks()) cache.use(task);
+  return cache.taken_in();
 }
 
 std::vector<std::int32_t> order_for_cache(const TaskTable& table, const std::vector<Batch>& batches, double bytes) {
@@ -157,6 +165,10 @@ std::vector<std::int32_t> order_for_cache(const TaskTable& table, const std::vec
       if (--waits[static_cast<std::size_t>(next)] == 0) ready[static_cast<std::size_t>(task_of(next).batch)] = next;
   }
   return order;
+}
+
+void order_if_large(TaskTable& table, const std::vector<Batch>& batches, double bytes) {
+  if (touched_bytes(batches) > 2.0 * bytes) table.reorder(order_for_cache(table, batches, bytes));
 }
 
 }  // namespace platen

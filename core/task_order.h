@@ -25,10 +25,16 @@ inline constexpr double ordered_cache = 12 << 20;
 // What a step touches of these batches [bytes].
 double touched_bytes(const std::vector<Batch>& batches);
 
+// What a cache that forgets what was not touched for longest takes in from memory, if the tasks run as the table has them [bytes].
+double bytes_from_memory(const TaskTable& table, const std::vector<Batch>& batches, double cache);
+
 // An order of the table's tasks that keeps all edges: order[k] = task that comes k-th. Greedy: of the batches that may go on,
-// the one that needs least from memory in a cache of so many bytes, which forgets what was not touched for longest; among such the
+// the one that needs least from memory in such a cache of so many bytes; among such the
 // one with most of its neighbours in the cache, since those let each other go on; then the one that is behind.
 // Takes about (tasks) x (batches in the cache and around it) operations.
 std::vector<std::int32_t> order_for_cache(const TaskTable& table, const std::vector<Batch>& batches, double bytes);
+
+// Puts the tasks into such an order where the batches have more than twice the bytes.
+void order_if_large(TaskTable& table, const std::vector<Batch>& batches, double bytes);
 
 }  // namespace platen

@@ -96,6 +96,10 @@ TEST(TaskOrder, BringsLessFromMemory) {
   EXPECT_EQ(loaded(plain, places), static_cast<int>(3 * batches) * steps);
   const TaskTable table = ordered(sim, steps, false, touched_bytes(sim.batches()) / 3.0);
   EXPECT_LT(loaded(table, places), loaded(plain, places) / 2);
+  // By bytes it counts alike.
+  const double third = touched_bytes(sim.batches()) / 3.0;
+  EXPECT_LT(bytes_from_memory(table, sim.batches(), third), 0.5 * bytes_from_memory(plain, sim.batches(), third));
+  EXPECT_NEAR(bytes_from_memory(plain, sim.batches(), 1e12), touched_bytes(sim.batches()), 1.0);
   // A cache that holds all has everything brought in once, in whatever order.
   EXPECT_EQ(loaded(ordered(sim, steps, false, 1e12), 2 * batches), static_cast<int>(2 * batches));
 }
