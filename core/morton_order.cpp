@@ -54,7 +54,8 @@ class Sweep {
     if (apart > 0.0) {  // else the bed is flat, and one layer
       along.cut(along.extent() / apart, most_layers);
       // Bars with a section as nearly square as can be.
-      const double bars = std::max(1.0, p.count / (static_cast<double>(layer) * along.parts()));
+      const double in_layer = static_cast<double>(p.count) / along.parts();
+      const double bars = std::max(1.0, in_layer / (layer > 0 ? layer : in_layer > 3000.0 ? 1000 : 500));
       const double section = across.extent() * up.extent() / bars;
       across.cut(std::min(bars, across.extent() / std::sqrt(section)), most_bars);
       up.cut(across.width() * up.extent() / section, most_bars);
@@ -93,8 +94,7 @@ class Sweep {
 
 std::vector<std::int32_t> morton_order(const Particles& particles, int layer) {
   const auto n = static_cast<std::size_t>(particles.count);
-  const double section = std::pow(static_cast<double>(particles.count), 2.0 / 3.0);  // of a cube
-  const Sweep sweep(particles, layer > 0 ? layer : static_cast<int>(std::clamp(section / 9.0, 500.0, 1000.0)));
+  const Sweep sweep(particles, layer);
   PooledVector<std::uint64_t> keys(n), other_keys(n);
   std::vector<std::int32_t> order(n), other_order(n);
   for (std::size_t k = 0; k < n; ++k) keys[k] = sweep.key(k), order[k] = static_cast<std::int32_t>(k);

@@ -19,8 +19,8 @@ namespace platen {
 //
 // Most partners of a sphere then lie within two layers, which the second cache holds: all but those across the side of a bar
 // or a periodic side. A curve that folds in all three directions leaves more of them further behind [docs/decisions.md].
-// layer: 0 = chosen, 500 to 1,000: beds of up to about a million spheres get nine bars or fewer, since each bar more is one more
-// that a group of batches waits for [core/task_order.h].
+// layer: 0 = chosen: 500, or 1,000 in beds with layers of more than 3,000, so that a batch is a thin slice of a bar and a group of
+// batches in the cache gets through several steps [core/task_order.h].
 std::vector<std::int32_t> morton_order(const Particles& particles, int layer = 0);
 
 }  // namespace platen

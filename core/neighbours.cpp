@@ -150,7 +150,7 @@ int automatic_batch(std::int32_t particles, int threads, bool even) {
   // no faster. Beds that no cache holds are run batch by batch in an order of their own, which needs small ones
   // [core/task_order.h, docs/decisions.md].
   threads = std::max(1, threads);
-  const int largest = particles > in_cache ? 2048 : 20000, each = std::max(1, (particles + threads * largest - 1) / (threads * largest));
+  const int largest = particles > particles_in_cache ? 2048 : 20000, each = std::max(1, (particles + threads * largest - 1) / (threads * largest));
   const int several = std::clamp(particles / 2048, 3 * threads, 8 * threads);
   const int count = threads == 1 || (threads == 2 && even) ? threads * each : std::max(threads * each, several);
   const int size = (particles + count - 1) / count;  // rounded up, or a last batch of a few spheres is left over

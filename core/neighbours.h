@@ -43,7 +43,7 @@ std::vector<Batch> make_batches(const Particles& particles, const Domain& domain
                                 const ParallelFor& parallel);
 
 // About as many particles, with their contacts, as the third cache of common processors holds.
-inline constexpr std::int32_t in_cache = 60000;
+inline constexpr std::int32_t particles_in_cache = 60000;
 
 // Particles in a batch where nothing else is asked for: enough batches for all threads, none too small to be worth a task.
 // `even`: equal stretches of the Morton curve are equal work; of interest to two threads only.

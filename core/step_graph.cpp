@@ -169,11 +169,11 @@ FlowGraph::FlowGraph(const TaskTable& table, TaskBody body) : graph_(std::make_u
   g.body = std::move(body);
   g.nodes.reserve(table.tasks().size());
   for (const Task& task : table.tasks()) {
-    const auto first = static_cast<tbb::flow::node_priority_t>(table.tasks().size() - g.nodes.size());
+    const auto priority = static_cast<tbb::flow::node_priority_t>(table.tasks().size() - g.nodes.size());
     g.nodes.push_back(std::make_unique<Graph::Node>(g.graph, [graph = graph_.get(), task](const tbb::flow::continue_msg&) {
       if (task.offset < graph->steps) graph->body(task);
       return tbb::flow::continue_msg();
-    }, table.ordered() ? first : tbb::flow::no_priority));
+    }, table.ordered() ? priority : tbb::flow::no_priority));
   }
   for (std::size_t t = 0; t < table.tasks().size(); ++t) {
     for (std::int32_t next : table.successors()[t]) tbb::flow::make_edge(*g.nodes[t], *g.nodes[static_cast<std::size_t>(next)]);

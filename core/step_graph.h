@@ -1,7 +1,8 @@
 // The tasks of a number of time steps, what each reads and writes, and the order that follows from it.
 //
-// The table is written down once in the order in which one thread would run it. Two tasks that touch the same resource,
-// at least one of them writing, keep that order: edges are derived, nobody writes them. The same table runs serially,
+// The table is written down once in the order of the steps. Two tasks that touch the same resource,
+// at least one of them writing, keep that order: edges are derived, nobody writes them. It may be put into another order that keeps all edges; then one
+// thread takes the tasks as they come, more take the first that is ready. The same table runs serially,
 // as an oneTBB flow graph, or on plain threads that wait on their predecessors' flags (for ThreadSanitizer, which cannot
 // see through an uninstrumented libtbb).
 #pragma once

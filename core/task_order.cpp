@@ -12,7 +12,8 @@ double state_bytes(const Batch& b) {
   return sphere * b.count + record_bytes * static_cast<double>(b.halo.size());
 }
 double contact_bytes(const Batch& b) {
-  return (4 * sizeof(double) + 2 * sizeof(std::int32_t) + sizeof(PairTargets)) * static_cast<double>(b.padded);
+  const double history = sizeof(double) * (b.k_t_last.empty() ? 4 : 5);
+  return (history + 2 * sizeof(std::int32_t) + sizeof(PairTargets)) * static_cast<double>(b.padded);
 }
 
 // Batches with numbers 0, 1, ..., some of which belong to it; adding, removing and looking at all take little.
@@ -74,13 +75,14 @@ class Cache {
  private:
   bool holds(std::size_t what) const { return last_use_[what] >= 0; }
   void touch(std::size_t what) {
-    if (!holds(what)) {
+    const bool is_new = !holds(what);
+    last_use_[what] = static_cast<std::int64_t>(uses_.size());
+    uses_.push_back(what);
+    if (is_new) {
       held_ += size_[what];
       taken_in_ += size_[what];
       if (what % 2 == 0) tell_neighbours(static_cast<int>(what / 2), 1);
     }
-    last_use_[what] = static_cast<std::int64_t>(uses_.size());
-    uses_.push_back(what);
     for (; held_ > capacity_ && oldest_ + 1 < uses_.size(); ++oldest_) {
       const std::size_t old = uses_[oldest_];
       if (last_use_[old] != static_cast<std::int64_t>(oldest_)) continue;  // used again since
@@ -128,8 +130,8 @@ double bytes_from_memory(const TaskTable& table, const std::vector<Batch>& batch
 }
 
 std::vector<std::int32_t> order_for_cache(const TaskTable& table, const std::vector<Batch>& batches, double bytes) {
-  // Weights against one batch's bytes from memory. Found by trying on beds of 280,000 and a million spheres; a factor of two in
-  // either changes little.
+  // Weights against the mean bytes of half a batch, its state or its contacts. Found by trying on beds of 280,000 and a million
+  // spheres; a factor of two in either changes little.
   constexpr double neighbours_weigh = 3.0, phase_weighs = 0.04;
   const double mean = touched_bytes(batches) / (2.0 * static_cast<double>(std::max<std::size_t>(batches.size(), 1)));
   Cache cache(batches, bytes);
@@ -153,7 +155,7 @@ std::vector<std::int32_t> order_for_cache(const TaskTable& table, const std::vec
       const double price = cache.missing(task) / mean + phase_weighs * phase - neighbours_weigh * cache.share_of_neighbours(b);
       if (best < 0 || price < best_price || (price == best_price && t < best)) best = t, best_price = price;
     }
-    if (best < 0) {  // nobody near what the cache holds can go on: the first of all who can
+    if (best < 0) {  // nobody near what the cache holds can go on, which is rare: the first of all who can
       for (const std::int32_t t : ready)
         if (t >= 0 && (best < 0 || t < best)) best = t;
     }
@@ -168,7 +170,8 @@ std::vector<std::int32_t> order_for_cache(const TaskTable& table, const std::vec
 }
 
 void order_if_large(TaskTable& table, const std::vector<Batch>& batches, double bytes) {
-  if (touched_bytes(batches) > 2.0 * bytes) table.reorder(order_for_cache(table, batches, bytes));
+  const double touched = touched_bytes(batches), of_batch = touched / static_cast<double>(std::max<std::size_t>(batches.size(), 1));
+  if (touched > 2.0 * bytes && 256.0 * of_batch > bytes) table.reorder(order_for_cache(table, batches, bytes));
 }
 
 }  // namespace platen

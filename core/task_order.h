@@ -28,13 +28,14 @@ double touched_bytes(const std::vector<Batch>& batches);
 // What a cache that forgets what was not touched for longest takes in from memory, if the tasks run as the table has them [bytes].
 double bytes_from_memory(const TaskTable& table, const std::vector<Batch>& batches, double cache);
 
-// An order of the table's tasks that keeps all edges: order[k] = task that comes k-th. Greedy: of the batches that may go on,
-// the one that needs least from memory in such a cache of so many bytes; among such the
-// one with most of its neighbours in the cache, since those let each other go on; then the one that is behind.
-// Takes about (tasks) x (batches in the cache and around it) operations.
+// An order of the table's tasks that keeps all edges: order[k] = task that comes k-th. Greedy: of the batches that may go on
+// the one with the lowest price, which rises with what it needs from memory in such a cache of so many bytes, falls with the share of
+// its neighbours that the cache holds, since those let each other go on, and rises a little with how far ahead it is.
+// Takes about (tasks) x (batches in the cache and around it) operations, and one look at all batches for each group far from the others.
 std::vector<std::int32_t> order_for_cache(const TaskTable& table, const std::vector<Batch>& batches, double bytes);
 
-// Puts the tasks into such an order where the batches have more than twice the bytes.
+// Puts the tasks into such an order where the batches have more than twice the bytes; not where they are so small that hundreds
+// fit in, for which nobody asks but a case file's `batch`: the search would take longer than it saves.
 void order_if_large(TaskTable& table, const std::vector<Batch>& batches, double bytes);
 
 }  // namespace platen

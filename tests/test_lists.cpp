@@ -246,9 +246,13 @@ TEST(AutomaticBatch, SeveralForEachThreadWhereItIsNot) {
   EXPECT_EQ(automatic_batch(35000, 4, true), 2064);
 }
 
-TEST(AutomaticBatch, NoneHasMoreThanTwentyThousand) {
+TEST(AutomaticBatch, NoneIsTooLarge) {
   for (const int threads : {1, 2, 4, 16})
-    for (const std::int32_t particles : {35'000, 280'000, 1'000'000, 5'000'000}) EXPECT_LE(automatic_batch(particles, threads, true), 20000);
+    for (const std::int32_t particles : {35'000, 280'000, 1'000'000, 5'000'000}) {
+      EXPECT_LE(automatic_batch(particles, threads, true), 20000);
+      if (particles <= particles_in_cache) continue;
+      EXPECT_LE(automatic_batch(particles, threads, true), 2048);
+    }
 }
 
 TEST(AutomaticBatch, EvenWork) {

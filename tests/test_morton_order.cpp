@@ -82,6 +82,14 @@ TEST(MortonOrder, DependsOnPlacesAlone) {
   }
 }
 
+TEST(MortonOrder, LayersGrowWithTheBed) {
+  const Particles small = grid(30, 20, 60), large = grid(10, 8, 700);  // layers of 1,200 and of 5,600
+  EXPECT_EQ(morton_order(small), morton_order(small, 500));
+  EXPECT_NE(morton_order(small), morton_order(small, 1000));
+  EXPECT_EQ(morton_order(large), morton_order(large, 1000));
+  EXPECT_NE(morton_order(large), morton_order(large, 500));
+}
+
 TEST(MortonOrder, OfNothing) { EXPECT_TRUE(morton_order(Particles()).empty()); }
 
 // One layer of a bar is 200 spheres here: partners in it and in the next one lie within two layers. What is further away

@@ -1,6 +1,8 @@
 // The order of tasks of beds that no cache holds [core/task_order.h].
 #include <gtest/gtest.h>
 
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <list>
 #include <map>
@@ -104,6 +106,25 @@ TEST(TaskOrder, BringsLessFromMemory) {
   EXPECT_EQ(loaded(ordered(sim, steps, false, 1e12), 2 * batches), static_cast<int>(2 * batches));
 }
 
+// Batches that touch nobody take all their steps one after the other.
+TEST(TaskOrder, BatchesWithoutNeighboursAreDoneOneByOne) {
+  std::vector<Batch> batches(40);
+  for (Batch& b : batches) b.count = 64, b.padded = 16;
+  TaskTable table(batches, 10, false);
+  table.reorder(order_for_cache(table, batches, touched_bytes(batches) / 8.0));
+  EXPECT_NEAR(bytes_from_memory(table, batches, touched_bytes(batches) / 8.0), touched_bytes(batches), 1.0);
+}
+
+TEST(TaskOrder, TinyBatchesAreLeftInTheOrderOfSteps) {
+  std::vector<Batch> batches(2000);
+  for (Batch& b : batches) b.count = 8;
+  for (const double share : {0.01, 0.4}) {  // 20 and 800 of them fit in
+    TaskTable table(batches, 2, false);
+    order_if_large(table, batches, share * touched_bytes(batches));
+    EXPECT_EQ(table.ordered(), share < 0.1);
+  }
+}
+
 TEST(TaskOrder, ABedThatFitsIsLeftInTheOrderOfSteps) {
   BedOptions o;
   o.nx = o.ny = o.nz = 6;
@@ -118,6 +139,25 @@ TEST(TaskOrder, ABedThatFitsIsLeftInTheOrderOfSteps) {
     EXPECT_TRUE(seen);
     EXPECT_EQ(was_ordered, !fits);
   }
+}
+
+// On one thread a graph takes exactly the order: the first task that is not done is always ready.
+TEST(TaskOrder, AGraphTakesTheFirstThatIsReady) {
+  Simulation sim = long_bed(64);
+  sim.ensure_forces();
+  const TaskTable table = ordered(sim, 6, false, touched_bytes(sim.batches()) / 4.0);
+  std::size_t done = 0, out_of_order = 0;
+  const TaskBody body = [&](const Task& task) {
+    const Task& wanted = table.tasks()[done++];
+    out_of_order += task.kind == wanted.kind && task.batch == wanted.batch && task.offset == wanted.offset ? 0 : 1;
+  };
+  tbb::task_arena one(1);
+  one.execute([&] {
+    FlowGraph graph(table, body);
+    graph.run(table.steps());
+  });
+  EXPECT_EQ(done, table.tasks().size());
+  EXPECT_EQ(out_of_order, 0u);
 }
 
 TEST(TaskOrder, AGraphRunsEveryTaskOnceAndInOrder) {
