@@ -197,7 +197,15 @@ void fill_inner(std::vector<Batch>& batches, const Particles& p, const Domain& d
     Inner& inner = inner_of_this_thread();
     inner.choose(b, close);
     inner.clear_history(with_k_t);
-    for (std::size_t to = 0; to < inner.from.size(); ++to) {
+    const auto lower_rank = [&](std::size_t to) {
+      const auto m = static_cast<std::size_t>(inner.from[to]);
+      return static_cast<std::size_t>(std::min(p.rank[static_cast<std::size_t>(b.outer_i[m])], p.rank[static_cast<std::size_t>(b.outer_j[m])]));
+    };
+    const std::size_t pairs = inner.from.size();
+    for (std::size_t to = 0; to < pairs; ++to) {
+      // Ranks lie anywhere: what the next pairs will read is asked for ahead.
+      if (to + 32 < pairs) __builtin_prefetch(&history.start[lower_rank(to + 32)]);
+      if (to + 16 < pairs) __builtin_prefetch(history.pairs.data() + history.start[lower_rank(to + 16)]);
       const auto m = static_cast<std::size_t>(inner.from[to]);
       const std::int32_t ri = p.rank[static_cast<std::size_t>(b.outer_i[m])], rj = p.rank[static_cast<std::size_t>(b.outer_j[m])];
       const auto low = static_cast<std::size_t>(std::min(ri, rj));

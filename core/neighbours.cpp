@@ -59,25 +59,30 @@ class CellGrid {
       ++start_[static_cast<std::size_t>(cell_of_[at]) + 1];
     }
     for (std::size_t c = 1; c < start_.size(); ++c) start_[c] += start_[c - 1];
-    members_.resize(static_cast<std::size_t>(p.count));
+    for (auto* column : {&x_, &y_, &z_, &reach_, &number_}) column->resize(static_cast<std::size_t>(p.count + padding));
+    particle_.resize(static_cast<std::size_t>(p.count + padding));
     PooledVector<std::int32_t> next(start_.begin(), start_.end() - 1);
     for (std::int32_t k = 0; k < p.count; ++k) {
       const double* row = p.rows.data() + row_size * static_cast<std::size_t>(k);
       const auto at = static_cast<std::size_t>(next[static_cast<std::size_t>(cell_of_[static_cast<std::size_t>(k)])]++);
-      members_[at] = {row[0], row[1], row[2], row[3] + margins.of[static_cast<std::size_t>(k)], k};
+      x_[at] = row[0], y_[at] = row[1], z_[at] = row[2], reach_[at] = row[3] + margins.of[static_cast<std::size_t>(k)];
+      number_[at] = k, particle_[at] = k;
     }
     lengths_[0] = domain.width, lengths_[1] = domain.depth, lengths_[2] = 0.0;
+    members_ = {x_.data(), y_.data(), z_.data(), reach_.data(), number_.data(), particle_.data(), 0.0, 0.0, 0.0, 0.0};
+    // A periodic axis with one or two cells: images are looked for pair by pair.
+    if (wraps_[0] && cells_[0] < 3) members_.width = lengths_[0], members_.inverse_width = 1.0 / lengths_[0];
+    if (wraps_[1] && cells_[1] < 3) members_.depth = lengths_[1], members_.inverse_depth = 1.0 / lengths_[1];
   }
+  CellGrid(const CellGrid&) = delete;  // members_ points into it
 
-  struct Member {
-    double x, y, z, reach;
-    std::int32_t particle;
-  };
+  const SearchMembers& members() const { return members_; }
 
-  // Calls visit(first, last, x, y, z) for the members of the cells around particle i, each cell once, with the place of
-  // i from which they are to be seen: that of the image next to them. Cells along x lie next to each other in memory.
-  template <class Visit>
-  void around(const Particles& p, std::int32_t i, const Visit& visit) const {
+  static constexpr int most_ranges = 3 * 3 * 2;
+
+  // The members of the cells around particle i, each cell once; returns the number of ranges. Cells along x lie next to each
+  // other in memory.
+  int around(const Particles& p, std::int32_t i, SearchRange (&found)[most_ranges]) const {
     const double* row = p.rows.data() + row_size * static_cast<std::size_t>(i);
     struct Range {
       int first, last;
@@ -99,20 +104,18 @@ class CellGrid {
         if (c == n - 1) add(0, 0, -lengths_[axis]);
       }
     }
+    int count = 0;
     for (int a = 0; a < length[2]; ++a)
       for (int z = ranges[2][a].first; z <= ranges[2][a].last; ++z)
         for (int b = 0; b < length[1]; ++b)
           for (int y = ranges[1][b].first; y <= ranges[1][b].last; ++y)
             for (int d = 0; d < length[0]; ++d) {
               const Range& x = ranges[0][d];
-              visit(members_.data() + start_[static_cast<std::size_t>(index(x.first, y, z))],
-                    members_.data() + start_[static_cast<std::size_t>(index(x.last, y, z)) + 1], row[0] + x.shift,
-                    row[1] + ranges[1][b].shift, row[2]);
+              found[count++] = {start_[static_cast<std::size_t>(index(x.first, y, z))], start_[static_cast<std::size_t>(index(x.last, y, z)) + 1],
+                                row[0] + x.shift, row[1] + ranges[1][b].shift, row[2]};
             }
+    return count;
   }
-
-  // Whether an image has to be looked for pair by pair: a periodic axis with one or two cells.
-  bool few_cells() const { return (wraps_[0] && cells_[0] < 3) || (wraps_[1] && cells_[1] < 3); }
 
  private:
   int coordinate(double x, int axis) const {
@@ -125,7 +128,9 @@ class CellGrid {
   double low_[3], inverse_[3], lengths_[3];
   int cells_[3];
   PooledVector<std::int32_t> start_, cell_of_;
-  PooledVector<Member> members_;
+  PooledVector<double> x_, y_, z_, reach_, number_;
+  PooledVector<std::int32_t> particle_;
+  SearchMembers members_;
 };
 
 // Greedy colouring of the batches: no two that share a pair get the same colour.
@@ -180,7 +185,7 @@ int BatchOf::operator()(std::int32_t particle) const {
 }
 
 std::vector<Batch> make_batches(const Particles& p, const Domain& domain, const Margins& margins, int size,
-                                const ParallelFor& parallel) {
+                                const KernelTable& kernels, const ParallelFor& parallel) {
   const int vectors = p.padded / padding;
   const int count = std::max(1, std::min(vectors, static_cast<int>(std::lround(static_cast<double>(p.padded) / size))));
   std::vector<Batch> batches(static_cast<std::size_t>(count));
@@ -196,7 +201,6 @@ std::vector<Batch> make_batches(const Particles& p, const Domain& domain, const 
   double largest = p.common_radius;
   if (!p.equal) largest = *std::max_element(p.radius.begin(), p.radius.begin() + p.count);
   const CellGrid grid(p, domain, margins, 2.0 * (largest + margins.largest));
-  const bool few_cells = grid.few_cells();
 
   // Every pair within a batch once, every pair across batches from both sides; then the owner keeps it.
   parallel(count, [&](int k) {
@@ -207,19 +211,13 @@ std::vector<Batch> make_batches(const Particles& p, const Domain& domain, const 
     to_i.reserve(static_cast<std::size_t>(batch.count) * 8), to_j.reserve(static_cast<std::size_t>(batch.count) * 8);
     for (std::int32_t i = batch.first; i < std::min(batch.first + batch.count, p.count); ++i) {
       const double own = p.radius_of(i) + margins.of[static_cast<std::size_t>(i)];
-      std::size_t kept = 0;
-      grid.around(p, i, [&](const CellGrid::Member* first, const CellGrid::Member* last, double x, double y, double z) {
-        close.resize(std::max(close.size(), kept + static_cast<std::size_t>(last - first)));
-        for (; first != last; ++first) {  // without a branch, which no processor could foresee
-          double dx = x - first->x, dy = y - first->y;
-          const double dz = z - first->z, reach = own + first->reach;
-          if (few_cells) dx = domain.nearest_x(dx), dy = domain.nearest_y(dy);
-          const std::int32_t j = first->particle;
-          close[kept] = j;
-          kept += static_cast<std::size_t>((dx * dx + dy * dy + dz * dz < reach * reach) & ((j > i) | (j < batch.first)));
-        }
-      });
-      for (std::size_t m = 0; m < kept; ++m) seen[static_cast<std::size_t>(batch_of[static_cast<std::size_t>(close[m] / padding)])] = 1;
+      SearchRange ranges[CellGrid::most_ranges];
+      const int count_of_ranges = grid.around(p, i, ranges);
+      std::size_t candidates = 0;
+      for (int r = 0; r < count_of_ranges; ++r) candidates += static_cast<std::size_t>(ranges[r].last - ranges[r].first);
+      if (close.size() < candidates + padding) close.resize(candidates + padding);
+      const auto kept = static_cast<std::size_t>(kernels.search(grid.members(), ranges, count_of_ranges, {own, static_cast<double>(i), static_cast<double>(batch.first)}, close.data()));
+      for (std::size_t m = 0; count > 1 && m < kept; ++m) seen[static_cast<std::size_t>(batch_of[static_cast<std::size_t>(close[m] / padding)])] = 1;
       to_i.insert(to_i.end(), kept, i);
       to_j.insert(to_j.end(), close.begin(), close.begin() + static_cast<std::ptrdiff_t>(kept));
     }

@@ -9,6 +9,7 @@
 #include "core/batches.h"
 #include "core/margins.h"
 #include "core/particles.h"
+#include "kernels/kernel_table.h"
 
 namespace platen {
 
@@ -40,7 +41,7 @@ inline double distance2(const double* a, const double* b, const Domain& domain) 
 // Cuts the particles into batches of about `size` and fills their outer lists with every pair closer than
 // R_i + R_j + both margins. Particles must be in Morton order, rows up to date.
 std::vector<Batch> make_batches(const Particles& particles, const Domain& domain, const Margins& margins, int size,
-                                const ParallelFor& parallel);
+                                const KernelTable& kernels, const ParallelFor& parallel);
 
 // About as many particles, with their contacts, as the third cache of common processors holds.
 inline constexpr std::int32_t particles_in_cache = 60000;

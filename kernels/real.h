@@ -58,6 +58,11 @@ struct Scalar {
   static PLATEN_INLINE Mask either(Mask a, Mask b) { return a || b; }
   static PLATEN_INLINE Mask negate(Mask a) { return !a; }
   static PLATEN_INLINE Mask not_less(Real a, Real b) { return !(a < b); }  // also where either is no number
+  // Those of `width` numbers whose bits are set, one behind the other; their number. Writes `width` places.
+  static PLATEN_INLINE int pack(unsigned bits, const std::int32_t* from, std::int32_t* to) {
+    *to = *from;
+    return static_cast<int>(bits);
+  }
   static PLATEN_INLINE Real fast_inverse_sqrt(Real a) { return 1.0 / __builtin_sqrt(a); }
   static PLATEN_INLINE double sum(Real a) { return a; }  // exact for order-free terms, whose order does not matter
   static PLATEN_INLINE double largest(Real a) { return a; }
@@ -138,6 +143,11 @@ struct Avx2 {
     return _mm256_xor_pd(a, _mm256_castsi256_pd(_mm256_set1_epi64x(-1)));
   }
   static PLATEN_INLINE Mask not_less(Real a, Real b) { return _mm256_cmp_pd(a, b, _CMP_NLT_UQ); }
+  static PLATEN_INLINE int pack(unsigned bits, const std::int32_t* from, std::int32_t* to) {
+    unsigned n = 0;
+    for (unsigned lane = 0; lane < width; ++lane) to[n] = from[lane], n += bits >> lane & 1u;
+    return static_cast<int>(n);
+  }
   static PLATEN_INLINE Real fast_inverse_sqrt(Real a) {
     return _mm256_div_pd(_mm256_set1_pd(1.0), _mm256_sqrt_pd(a));
   }
@@ -261,6 +271,11 @@ struct Avx512 {
   static PLATEN_INLINE Mask either(Mask a, Mask b) { return _kor_mask8(static_cast<__mmask8>(a), static_cast<__mmask8>(b)); }
   static PLATEN_INLINE Mask negate(Mask a) { return _knot_mask8(static_cast<__mmask8>(a)); }
   static PLATEN_INLINE Mask not_less(Real a, Real b) { return _mm512_cmp_pd_mask(a, b, _CMP_NLT_UQ); }
+  static PLATEN_INLINE int pack(unsigned bits, const std::int32_t* from, std::int32_t* to) {
+    const __m256i all = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_maskz_compress_epi32(static_cast<__mmask8>(bits), all));
+    return __builtin_popcount(bits);
+  }
   // 14 correct bits, then one step of fourth order in e = 1 - a y^2: y <- y + y e (1/2 + 3/8 e + 5/16 e^2). What is left
   // out is below 2^-54 of the result; rounding makes the error up to 1.5 ulp.
   static PLATEN_INLINE Real fast_inverse_sqrt(Real a) {

@@ -99,6 +99,23 @@ struct PairTotals {
   bool out_of_range = false;               // an overlap, a force of a deep overlap or an energy beyond its bound, or no number
 };
 
+// Spheres in the order of the cells of a grid, padded to a whole vector behind the last.
+struct SearchMembers {
+  const double *x, *y, *z;
+  const double* reach;      // R and margin [m]
+  const double* number;     // the particle again, to be compared as the others are
+  const std::int32_t* particle;
+  double width, inverse_width, depth, inverse_depth;  // where images have to be looked for pair by pair; else 0
+};
+struct SearchRange {
+  std::int32_t first, last;  // members
+  double x, y, z;            // place from which the sphere sees them: that of the image next to them
+};
+struct SearchedSphere {
+  double reach;
+  double particle, first_of_batch;
+};
+
 // One plane: a plate or a wall, its outward normal along an axis.
 struct Plane {
   int axis = 2;
