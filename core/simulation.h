@@ -166,11 +166,12 @@ class Simulation {
   void merge_all();
   void keep_sums(AlignedArray<double>& sums);
   void put_sums(const AlignedArray<double>& sums);
-  double displacement(std::size_t k, const AlignedArray<double>& reference, const double (&drift)[3]) const;
+  LookTotals look_at(const AlignedArray<double>& margins, const AlignedArray<double>* then, const double (&drift)[3]);
+  void find_speeds();
   double own_speed(std::size_t k) const;
   void choose_horizon();
   double widest_margin() const;
-  double least_margin(std::size_t k) const;
+  double least_margin(double speed) const;
   void check_speeds();
   bool choose_margins(bool fresh);
   int look(int wanted);
@@ -223,6 +224,7 @@ class Simulation {
 
   // Lists.
   Margins inner_, outer_;
+  AlignedArray<double> speed_;                  // of each sphere, relative to mean_, when lists were last made [m/s]
   AlignedArray<double> room_;                   // what each sphere may still move [m]
   AlignedArray<double> speed2_;                 // of each sphere: sum over a run of steps of |v - mean_|^2 [m2/s2]
   double plate_gap_ = 0.0;                      // bound of the planes' motion that lists allow [m]

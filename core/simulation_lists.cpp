@@ -55,20 +55,11 @@ void Simulation::put_sums(const AlignedArray<double>& sums) {
 
 void Simulation::remember(AlignedArray<double>& reference, double (&drift)[3]) {
   const auto n = static_cast<std::size_t>(particles_.count);
-  reference.resize(3 * n);
+  reference.resize(3 * n + padding);  // whole vectors may be read
   std::copy_n(particles_.x.data(), n, reference.data());
   std::copy_n(particles_.y.data(), n, reference.data() + n);
   std::copy_n(particles_.z.data(), n, reference.data() + 2 * n);
   std::fill(drift, drift + 3, 0.0);
-}
-
-// Displacement of particle k since the positions were remembered, relative to the common drift [m].
-double Simulation::displacement(std::size_t k, const AlignedArray<double>& reference, const double (&drift)[3]) const {
-  const auto n = static_cast<std::size_t>(particles_.count);
-  const double dx = domain_.nearest_x(particles_.x[k] - reference[k] - drift[0]);
-  const double dy = domain_.nearest_y(particles_.y[k] - reference[n + k] - drift[1]);
-  const double dz = particles_.z[k] - reference[2 * n + k] - drift[2];
-  return std::sqrt(dx * dx + dy * dy + dz * dz);
 }
 
 // Speed relative to the common velocity [m/s].
@@ -85,11 +76,15 @@ void Simulation::mean_velocity() {
   parallel(static_cast<int>(batches_.size()), [&](int index) {
     const Batch& b = batches_[static_cast<std::size_t>(index)];
     const AlignedArray<double>* columns[3] = {&particles_.vx, &particles_.vy, &particles_.vz};
+    const auto first = static_cast<std::size_t>(b.first), last = static_cast<std::size_t>(std::clamp(particles_.count, b.first, b.first + b.count));
     for (int axis = 0; axis < 3; ++axis) {
-      double sum = 0.0;
-      for (std::int32_t k = b.first; k < std::min(b.first + b.count, particles_.count); ++k)
-        sum += (*columns[axis])[static_cast<std::size_t>(k)];
-      sums[static_cast<std::size_t>(index)].v[axis] = sum;
+      const AlignedArray<double>& v = *columns[axis];
+      double part[4] = {0.0, 0.0, 0.0, 0.0};  // side by side: an addition would wait for the one before
+      std::size_t k = first;
+      for (; k + 4 <= last; k += 4)
+        for (std::size_t lane = 0; lane < 4; ++lane) part[lane] += v[k + lane];
+      for (; k < last; ++k) part[0] += v[k];
+      sums[static_cast<std::size_t>(index)].v[axis] = (part[0] + part[1]) + (part[2] + part[3]);
     }
   });
   for (int axis = 0; axis < 3; ++axis) {
@@ -133,29 +128,38 @@ double Simulation::widest_margin() const {
   return std::min(wish, std::max(0.0, 0.25 * std::min(domain_.width, domain_.depth) - largest_radius_));
 }
 
-// Margin without which a sphere could not take a single step [m].
-double Simulation::least_margin(std::size_t k) const { return 1.01 * (caution * own_speed(k) + gravity_ * dt_) * dt_; }
+// Margin without which a sphere of this speed could not take a single step [m].
+double Simulation::least_margin(double speed) const { return 1.01 * (caution * speed + gravity_ * dt_) * dt_; }
+
+void Simulation::find_speeds() {
+  const auto n = static_cast<std::size_t>(particles_.count);
+  speed_.resize(n);
+  for (std::size_t k = 0; k < n; ++k) speed_[k] = own_speed(k);
+}
 
 // Ends the run where a sphere is too fast for any list. Looked for before lists are touched: what a failure tells, and
 // what is still written after it, needs lists and particles that belong together.
 void Simulation::check_speeds() {
+  find_speeds();
   double needed = 0.0;
-  for (std::size_t k = 0; k < static_cast<std::size_t>(particles_.count); ++k) needed = std::max(needed, least_margin(k));
+  for (std::size_t k = 0; k < static_cast<std::size_t>(particles_.count); ++k) needed = std::max(needed, least_margin(speed_[k]));
   if (needed > widest_margin())
     fail("a sphere moves " + std::to_string(needed / largest_radius_) +
          " radii in one step: more than lists can follow; use a smaller time step");
 }
 
-// Margins that hold for about a horizon, by the present speeds; false where the outer lists are too narrow for them.
+// Margins that hold for about a horizon, by the speeds that were found last (`fresh`: finds them, since spheres have new places); false where the outer lists are too narrow for them.
 bool Simulation::choose_margins(bool fresh) {
   const auto n = static_cast<std::size_t>(particles_.count);
   const double R = largest_radius_, most = widest_margin();
   inner_.of.resize(static_cast<std::size_t>(particles_.padded));
   if (fresh) outer_.of.resize(static_cast<std::size_t>(particles_.padded));
+  if (fresh) find_speeds();
+  if (!fresh) look_at(outer_.of, &at_rebuild_, drift_at_rebuild_);  // what the outer lists leave
   // Who is slow may be hit: a sphere's margin is never below what the mean speed, times a factor that grows whenever
   // steps had to be done again, takes.
   double mean_speed = 0.0;
-  for (std::size_t k = 0; k < n; ++k) mean_speed += own_speed(k);
+  for (std::size_t k = 0; k < n; ++k) mean_speed += speed_[k];
   const double least_path = n > 0 ? caution * kick_factor_ * mean_speed / static_cast<double>(n) * dt_ : 0.0;
   kick_factor_ = std::max(1.0, 0.97 * kick_factor_);
   bool enough = true;
@@ -163,8 +167,8 @@ bool Simulation::choose_margins(bool fresh) {
   inner_.largest = 0.0;
   if (fresh) outer_.largest = 0.0;
   for (std::size_t k = 0; k < n; ++k) {
-    const double now = caution * own_speed(k) * dt_, path = std::max(now, least_path);  // of one step
-    const double needed = least_margin(k);
+    const double now = caution * speed_[k] * dt_, path = std::max(now, least_path);  // of one step
+    const double needed = least_margin(speed_[k]);
     const double wish = engine_.inner_gap > 0.0 ? 0.5 * engine_.inner_gap : std::max(smallest_inner * R, horizon_ * path);
     double inner = std::min(std::max({wish, redo_margin_, needed}), most);
     if (fresh) {
@@ -172,8 +176,7 @@ bool Simulation::choose_margins(bool fresh) {
       outer_.of[k] = std::clamp(further, inner, most);
       outer_sum += outer_.of[k], outer_.largest = std::max(outer_.largest, outer_.of[k]);
     } else {
-      // What the outer lists leave, as long as it lasts for some steps.
-      const double left = outer_.of[k] - displacement(k, at_rebuild_, drift_at_rebuild_);
+      const double left = room_[k];  // enough if it lasts for some steps
       enough = enough && left >= std::max({std::min(inner, worthwhile * path), std::min(redo_margin_, most), needed});
       inner = std::min(inner, left);
     }
@@ -186,32 +189,33 @@ bool Simulation::choose_margins(bool fresh) {
   return enough;
 }
 
+// Sets the room that each sphere has left of its margin since the positions `then`; null: nothing has moved since.
+LookTotals Simulation::look_at(const AlignedArray<double>& margins, const AlignedArray<double>* then, const double (&drift)[3]) {
+  room_.resize(static_cast<std::size_t>(particles_.padded));
+  speed2_.resize(static_cast<std::size_t>(particles_.padded));
+  const LookConstants constants{domain_.width, domain_.inverse_width, domain_.depth, domain_.inverse_depth,
+                                {drift[0], drift[1], drift[2]}, {mean_[0], mean_[1], mean_[2]}, std::numeric_limits<double>::infinity()};
+  std::vector<LookTotals> found(batches_.size());
+  parallel(static_cast<int>(batches_.size()), [&](int index) {
+    const Batch& b = batches_[static_cast<std::size_t>(index)];
+    const Particles& p = particles_;
+    const auto first = static_cast<std::size_t>(b.first), n = static_cast<std::size_t>(p.count);
+    const auto column = [&](std::size_t axis) { return then != nullptr ? then->data() + axis * n + first : nullptr; };
+    const LookBatch batch{p.x.data() + first, p.y.data() + first, p.z.data() + first, p.vx.data() + first, p.vy.data() + first, p.vz.data() + first,
+                          column(0), column(1), column(2), margins.data() + first, room_.data() + first, speed2_.data() + first, b.count,
+                          std::clamp(p.count - b.first, 0, b.count)};
+    kernels_.look(batch, constants, found[static_cast<std::size_t>(index)]);
+  });
+  LookTotals all;
+  for (const LookTotals& of : found) all.fastest = std::max(all.fastest, of.fastest), all.closest = std::max(all.closest, of.closest);
+  return all;
+}
+
 // For how many steps, at most `wanted`, the lists will hold if speeds do not grow much; 0 where not for one. Sets the
 // room that each sphere has left, which the steps watch.
 int Simulation::look(int wanted) {
-  room_.resize(static_cast<std::size_t>(particles_.padded));
-  speed2_.resize(static_cast<std::size_t>(particles_.padded));
-  std::vector<double> tight(batches_.size(), 0.0), bare(batches_.size(), 0.0);
-  parallel(static_cast<int>(batches_.size()), [&](int index) {
-    const Batch& b = batches_[static_cast<std::size_t>(index)];
-    double fastest = 0.0, smallest = 0.0;
-    for (std::int32_t local = 0; local < b.count; ++local) {
-      const auto k = static_cast<std::size_t>(b.first + local);
-      speed2_[k] = 0.0;
-      if (b.first + local >= particles_.count) {  // what fills up the last vector
-        room_[k] = std::numeric_limits<double>::infinity();
-        continue;
-      }
-      const double left = moved_since_prune_ ? inner_.of[k] - displacement(k, at_prune_, drift_at_prune_) : inner_.of[k];
-      const double inverse = 1.0 / std::max(left, 1e-100);  // finite, so that no speed of 0 makes it not a number
-      room_[k] = std::max(left, 0.0);
-      fastest = std::max(fastest, own_speed(k) * inverse);
-      smallest = std::max(smallest, inverse);
-    }
-    tight[static_cast<std::size_t>(index)] = fastest, bare[static_cast<std::size_t>(index)] = smallest;
-  });
-  const double fastest = caution * *std::max_element(tight.begin(), tight.end());
-  const double closest = gravity_ * dt_ * *std::max_element(bare.begin(), bare.end());
+  const LookTotals found = look_at(inner_.of, moved_since_prune_ ? &at_prune_ : nullptr, drift_at_prune_);
+  const double fastest = caution * found.fastest, closest = gravity_ * dt_ * found.closest;
   const auto holds = [&](int steps) {  // a free fall or a push may add speed; a kick by gravity is the least to expect
     return (fastest + closest * steps) * (dt_ * steps) <= 1.0 && plane_moved_ + plane_path(steps) <= plate_gap_;
   };

@@ -16,6 +16,7 @@ struct KernelTable {
   void (*plates)(const PlateBatch&, const Plane&, const PlateConstants&, PlateTotals&) noexcept = nullptr;
   void (*motion)(const MotionBatch&, const MotionConstants&, MotionTotals&) noexcept = nullptr;
   int (*search)(const SearchMembers&, const SearchRange*, int count, const SearchedSphere&, std::int32_t* found) noexcept = nullptr;
+  void (*look)(const LookBatch&, const LookConstants&, LookTotals&) noexcept = nullptr;
   InstructionSet instruction_set = InstructionSet::scalar;
   int scene = 0;             // index into built_scenes
   bool energy = true;        // sums of the ledger are formed

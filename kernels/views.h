@@ -116,6 +116,26 @@ struct SearchedSphere {
   double particle, first_of_batch;
 };
 
+// Spheres of a batch when lists are looked at: now, and when the inner list was made.
+struct LookBatch {
+  const double *x, *y, *z, *vx, *vy, *vz;
+  const double *then_x, *then_y, *then_z;  // null where nothing has moved since
+  const double* margin;                    // what each may move [m]
+  double* room;                            // out: what is left of it [m]
+  double* speed2;                          // set to 0
+  std::int32_t count, particles;           // multiple of padding; of them particles
+};
+struct LookConstants {
+  double width, inverse_width, depth, inverse_depth;  // periodic lengths; 0 where not periodic
+  double drift[3];                                    // that all have in common since [m]
+  double mean[3];                                     // common velocity [m/s]
+  double boundless;                                   // room of what fills up the last vector
+};
+struct LookTotals {
+  double fastest = 0.0;  // largest speed over room [1/s]
+  double closest = 0.0;  // largest inverse of a room [1/m]
+};
+
 // One plane: a plate or a wall, its outward normal along an axis.
 struct Plane {
   int axis = 2;
