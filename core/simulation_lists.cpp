@@ -177,7 +177,7 @@ bool Simulation::choose_margins(bool fresh) {
       outer_sum += outer_.of[k], outer_.largest = std::max(outer_.largest, outer_.of[k]);
     } else {
       const double left = room_[k];  // enough if it lasts for some steps
-      enough = enough && left >= std::max({std::min(inner, worthwhile * path), std::min(redo_margin_, most), needed});
+      enough = enough && left > 0.0 && left >= std::max({std::min(inner, worthwhile * path), std::min(redo_margin_, most), needed});
       inner = std::min(inner, left);
     }
     inner_.of[k] = inner;

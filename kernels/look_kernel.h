@@ -1,5 +1,5 @@
-// What room each sphere of a batch has left until its list no longer holds, and how soon it may use it up
-// [core/simulation_lists.cpp, Simulation::look].
+// What room each sphere of a batch has left until a list no longer holds, and how soon it may use it up
+// [core/simulation_lists.cpp, Simulation::look_at].
 #pragma once
 
 #include "kernels/real.h"
@@ -27,7 +27,7 @@ void look_kernel(const LookBatch& b, const LookConstants& c, LookTotals& totals)
     }
     const Real speed = length(I::load(b.vx + k) - I::set(c.mean[0]), I::load(b.vy + k) - I::set(c.mean[1]), I::load(b.vz + k) - I::set(c.mean[2]));
     const auto exists = lane_numbers < I::set(b.particles - k);
-    // The largest number a root or a product makes of it is still one, so that no speed of 0 makes it none.
+    // Finite where no room is left, so that a speed of 0 times it is a number.
     const Real inverse = one / I::where(left < tiny, tiny, left);
     I::store(b.room + k, I::where(exists, I::where(left < zero, zero, left), I::set(c.boundless)));
     I::store(b.speed2 + k, zero);

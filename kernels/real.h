@@ -58,7 +58,7 @@ struct Scalar {
   static PLATEN_INLINE Mask either(Mask a, Mask b) { return a || b; }
   static PLATEN_INLINE Mask negate(Mask a) { return !a; }
   static PLATEN_INLINE Mask not_less(Real a, Real b) { return !(a < b); }  // also where either is no number
-  // Those of `width` numbers whose bits are set, one behind the other; their number. Writes `width` places.
+  // Those of `width` numbers whose bits are set, one behind the other; their number. Writes `width` places. [tests/test_search.cpp]
   static PLATEN_INLINE int pack(unsigned bits, const std::int32_t* from, std::int32_t* to) {
     *to = *from;
     return static_cast<int>(bits);

@@ -116,7 +116,7 @@ struct SearchedSphere {
   double particle, first_of_batch;
 };
 
-// Spheres of a batch when lists are looked at: now, and when the inner list was made.
+// Spheres of a batch when lists are looked at: now, and when the list in question was made.
 struct LookBatch {
   const double *x, *y, *z, *vx, *vy, *vz;
   const double *then_x, *then_y, *then_z;  // null where nothing has moved since

@@ -130,6 +130,34 @@ TEST(Lists, NoPairIsMissedAtAnySpeed) {
 
 // Spheres that are pushed onto a plate which they are not listed with, where no other sphere is near: it counts as a neighbour
 // too. They go 0.067 R in 32 steps: farther than to the plate, less than the outer lists allow.
+// Boxes of two to six cells a side, with spheres on the edges of box and cells: images are looked for pair by pair where there
+// are less than three.
+TEST(Lists, NoPairIsMissedInNarrowBoxes) {
+  for (const InstructionSet set : available_instruction_sets())
+    for (int nx = 3; nx <= 7; ++nx)
+      for (int ny = 3; ny <= 7; ++ny) {
+        BedOptions o;
+        o.nx = nx, o.ny = ny, o.nz = 5, o.spread = 0.05;
+        SimulationSetup setup = scenes::bed(o, stiff_law(), {});
+        setup.engine.instruction_set = set;
+        setup.engine.batch = 16;
+        // The first sphere of each row comes to stand on an edge of a cell, the row with it.
+        for (int row = 0; row < ny * o.nz; ++row) {
+          double* x = setup.spheres.position.data() + 3 * nx * row;
+          const int cells = 1 + row % 5;
+          const double shift = setup.width * (row % cells) / cells - x[0];
+          for (int i = 1; i < nx; ++i) x[3 * i] += shift;
+          x[0] = setup.width * (row % cells) / cells;
+        }
+        Simulation sim(setup);
+        sim.ensure_forces();
+        const Pairs all = touching(sim, setup);
+        EXPECT_GT(2 * all.size(), setup.spheres.id.size());
+        EXPECT_EQ(listed(sim), all) << nx << " x " << ny;
+        EXPECT_EQ(sim.measure().contacts, static_cast<std::int64_t>(all.size())) << nx << " x " << ny;
+      }
+}
+
 TEST(Lists, NoPlateIsMissedByASphereThatIsPushed) {
   BedOptions o;
   o.nx = o.ny = 4, o.nz = 2, o.spacing = 3.0, o.speed = 0.0;

@@ -66,6 +66,7 @@ TEST(Search, FindsWhatOnePairAtATimeFinds) {
           std::vector<std::int32_t> found(static_cast<std::size_t>(count + padding), -1);
           const int kept = kernels.search(members.view, ranges.data(), 4, sphere, found.data());
           const std::vector<std::int32_t> wanted = one_by_one(members.view, ranges, sphere);
+          for (std::size_t k = static_cast<std::size_t>(kept + padding); k < found.size(); ++k) EXPECT_EQ(found[k], -1) << to_string(set);
           found.resize(static_cast<std::size_t>(kept));
           EXPECT_EQ(found, wanted) << to_string(set);
           all += wanted.size();
