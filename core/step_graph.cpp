@@ -176,7 +176,12 @@ FlowGraph::FlowGraph(const TaskTable& table, TaskBody body) : graph_(std::make_u
     }, table.ordered() ? priority : tbb::flow::no_priority));
   }
   for (std::size_t t = 0; t < table.tasks().size(); ++t) {
-    for (std::int32_t next : table.successors()[t]) tbb::flow::make_edge(*g.nodes[t], *g.nodes[static_cast<std::size_t>(next)]);
+    // The same batch's next task last: of those that a thread sets free it goes on with that one, whose arrays its caches hold, and
+    // leaves the others to be taken. Otherwise two threads may change batches at every task.
+    for (const bool own : {false, true})
+      for (std::int32_t next : table.successors()[t])
+        if ((table.tasks()[static_cast<std::size_t>(next)].batch == table.tasks()[t].batch) == own)
+          tbb::flow::make_edge(*g.nodes[t], *g.nodes[static_cast<std::size_t>(next)]);
     if (table.predecessors()[t] == 0) g.roots.push_back(g.nodes[t].get());
   }
 }

@@ -152,7 +152,9 @@ TEST(StudyFile, ShippedOnesAreRight) {
     const Study study = read_study(entry.path(), {"study.seeds=[7]"});
     for (const Study& part : study.parts)
       EXPECT_TRUE(part.timed || part.seeds == std::vector<std::uint64_t>{7}) << part.name;
-    EXPECT_GT(make_plan(study).jobs.size(), 1u) << entry.path();
+    const StudyPlan plan = make_plan(study);
+    EXPECT_GT(plan.jobs.size(), 1u) << entry.path();
+    for (const Job& job : plan.jobs) EXPECT_LE(job.name.size(), 220u) << job.name;  // folders and files are named after it
     ++count;
   }
   EXPECT_GE(count, 10);
@@ -180,6 +182,23 @@ TEST(StudyPlan, ProductOfRadiiPowersAndKeys) {
     EXPECT_EQ(curve.reference, 0u);
   }
   EXPECT_EQ(part.curves.back().label, "coarse R=3 mm b=3 friction=0.5");
+}
+
+TEST(StudyPlan, LongNamesAreCutAndStayTheirCases) {
+  const auto names = [](const std::string& keys) {
+    const StudyFolder folder(replaced("radius = \"3 mm\"\nstiffness = [0, 1, 2]", "radius = \"3 mm\"\n" + keys, without_scan), base_text);
+    std::vector<std::string> all;
+    for (const Job& job : make_plan(read_study(folder.file())).jobs) all.push_back(job.name);
+    return all;
+  };
+  std::string set = "set = [";
+  for (const char* key : {"plates.young_modulus", "plates.particle_young_modulus", "particles.law.friction", "particles.law.restitution", "plates.particle_poisson_ratio",
+                          "plates.friction", "plates.restitution", "plates.poisson_ratio"})
+    set += "\"" + std::string(key) + "=0.123456789012345678\", ";
+  const std::vector<std::string> first = names(set + "\"plates.rolling_friction=0.2\"]"), second = names(set + "\"plates.rolling_friction=0.25\"]");
+  EXPECT_LE(first.back().size(), 220u);
+  EXPECT_NE(first.back(), second.back());
+  EXPECT_EQ(first, names(set + "\"plates.rolling_friction=0.2\"]"));
 }
 
 // ---------------------------------------------------------------------------------------------------- collapse errors

@@ -1,6 +1,7 @@
 #include "protocol/study/plan.h"
 
 #include <fmt/format.h>
+#include <xxhash.h>
 
 #include <algorithm>
 #include <cmath>
@@ -43,6 +44,12 @@ std::string folder_key(const std::string& key) {
 std::string plain_value(std::string toml) {
   std::erase(toml, '"');
   return toml;
+}
+
+// File systems take names of 255 bytes. A long one ends in a hash of all of it, so that it stays one case's, whatever else is planned.
+std::string short_enough(const std::string& name) {
+  constexpr std::size_t most = 200, kept = 160;
+  return name.size() <= most ? name : name.substr(0, kept) + fmt::format("-{:016x}", XXH3_64bits(name.data(), name.size()));
 }
 
 std::string radius_text(double R) { return fmt::format("{:g} mm", 1e3 * R); }
@@ -244,6 +251,7 @@ class Planner {
     for (const auto& [key, value] : curve.varied) name += "-" + path_part(folder_key(key) + "=" + plain_value(value));
     for (const std::string& text : spec.set)
       name += "-" + path_part(folder_key(text.substr(0, text.find('='))) + "=" + plain_value(text.substr(text.find('=') + 1)));
+    name = short_enough(name);
     if (matched_to) name += "-matched";
     name += fmt::format("-s{}", seed);
     if (repeat > 0) name += fmt::format("-t{}", repeat);
