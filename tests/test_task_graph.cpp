@@ -1,5 +1,6 @@
 // The order of tasks: what must not happen at once is ordered by edges, for the batches of real beds.
 #include <gtest/gtest.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <mutex>
@@ -171,6 +172,28 @@ TEST(TaskGraph, AccessesAreThoseOfTheLists) {
         EXPECT_TRUE(declares(TaskKind::integrate, k, in.batch, resource_halo, false)) << k << " reads halo of " << in.batch;
     }
     EXPECT_EQ(foreign > 0, batches.size() > 1);
+  });
+}
+
+// Whoever sets several tasks free goes on with that of the batch it has just worked on.
+TEST(TaskGraph, AThreadStaysWithItsBatch) {
+  for_each_table(3, [](const Simulation&, const TaskTable& table) {
+    std::vector<std::int32_t> waits = table.predecessors();
+    const auto number = [&](const Task& task) {
+      const auto same = [&](const Task& t) { return t.kind == task.kind && t.batch == task.batch && t.offset == task.offset; };
+      return static_cast<std::size_t>(std::find_if(table.tasks().begin(), table.tasks().end(), same) - table.tasks().begin());
+    };
+    int wanted = -1, left = 0;  // the task that should come now; times that another one came
+    const TaskBody body = [&](const Task& task) {
+      const std::size_t t = number(task);
+      left += wanted >= 0 && wanted != static_cast<int>(t) ? 1 : 0;
+      wanted = -1;
+      for (const std::int32_t next : table.successors()[t])
+        if (--waits[static_cast<std::size_t>(next)] == 0 && table.tasks()[static_cast<std::size_t>(next)].batch == task.batch) wanted = next;
+    };
+    tbb::task_arena one(1);
+    one.execute([&] { FlowGraph(table, body).run(table.steps()); });
+    EXPECT_EQ(left, 0);
   });
 }
 
