@@ -3,6 +3,7 @@
 //
 //   bench_accuracy --case I -o accuracy-I        the same with II and III; --quick for a look
 //   bench_accuracy --case II -o accuracy-II --parts step,speed
+//   bench_accuracy --case II -o strength-II --parts auto --safeties 0.3 --seeds 64    one question, many beds
 //
 // In the folder: collisions.csv, bulk.csv, accuracy.json, plots (gnuplot), recommendation.md, and the runs themselves; a
 // run that is there already is not repeated.
@@ -150,17 +151,20 @@ int main(int argc, char** argv) {
   bool quick = false;
   int processes = 1, seeds = 0;
   std::vector<std::string> parts = {"collisions", "step", "auto", "speed", "same", "scale"};
+  std::vector<double> safeties;
   app.add_option("--case", name, "I, II or III of the paper, at R = 3.75 mm")->check(CLI::IsMember({"I", "II", "III"}));
   app.add_option("-o", folder, "folder")->required();
   app.add_flag("--quick", quick, "140 spheres, fast plates, three seeds: a look, not a result");
   app.add_option("--jobs", processes, "runs side by side")->check(CLI::Range(1, 1024));
   app.add_option("--seeds", seeds, "beds (default 8; 3 with --quick)")->check(CLI::Range(2, 100));
   app.add_option("--parts", parts, "of the measurement: collisions, step, auto, speed, same, scale (all)")->delimiter(',')->check(CLI::IsMember({"collisions", "step", "auto", "speed", "same", "scale"}));
+  app.add_option("--safeties", safeties, "of the part auto (default 0.2,0.3,0.4,0.5; 0.2,0.4 with --quick)")->delimiter(',')->check(CLI::Range(0.01, 0.9));
   CLI11_PARSE(app, argc, argv);
   try {
     fs::create_directories(folder);
     const BulkCase b = bulk_case(name);
-    const BulkSize size = bulk_size(quick);
+    BulkSize size = bulk_size(quick);
+    if (!safeties.empty()) size.safeties = safeties;
     const bool crush = b.crush;
     const int beds = seeds > 0 ? seeds : size.seeds;
     std::string report = fmt::format("# Accuracy, case {}\n\n{}{} spheres of R = 3.75 mm in a periodic box of {:g} x {:g} mm, {} seeds.\n\n", name,

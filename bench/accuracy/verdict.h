@@ -106,14 +106,14 @@ std::string verdict_table(const std::string& head, const std::vector<Verdict>& v
       const Verdict& r = verdicts[k];
       if (&v == &reference) lines += fmt::format(" {:.5g}, seeds ±{:.2g} |", r.mean, r.scatter);
       else lines += fmt::format(" {:+.2g} ± {:.2g} |", r.difference, r.error);
-      worst = std::max(worst, r.bound() / r.scatter);
+      if (const double share = r.bound() / r.scatter; !(share <= worst) && !std::isnan(worst)) worst = share;  // what is not known stays so
       complete = complete && r.complete;
     }
     const std::size_t seeds = figures.at(v.name).size();
     const std::string few = seeds < figures.at(reference.name).size() ? fmt::format(" (reference, the same {} seeds: {:.3f})", seeds, reference_work(figures, reference, v)) : "";
     lines += fmt::format(" {} | {:.1e} | {:.3f}{} | {:.1f} | {} |\n", &v == &reference ? "" : complete ? fmt::format("{:.2f}", worst) : "", moments(column(figures, v.name, "energy")).mean,
                          work_of(figures, v), few, seconds_of(figures, v).mean,
-                         &v == &reference ? "reference" : !complete ? "runs failed" : worst < 0.2 ? "a fifth" : worst < 0.5 ? "half" : worst < 1.0 ? "the scatter" : "no");
+                         &v == &reference ? "reference" : !complete ? "runs failed" : worst < 0.2 ? "a fifth" : worst < 0.5 ? "half" : worst < 1.0 ? "the scatter" : std::isnan(worst) ? "not known" : "no");
   }
   return lines;
 }
@@ -126,7 +126,7 @@ inline std::string recommendation_table(const std::vector<Verdict>& verdicts, co
     for (const double accepted : {0.005, 0.01, 0.02, 0.05}) {
       const Verdict* best = nullptr;
       for (const Verdict& v : verdicts) {
-        if (q.key != std::string(v.quantity) || !v.complete || v.bound() > accepted * std::fabs(v.mean)) continue;
+        if (q.key != std::string(v.quantity) || !v.complete || !(v.bound() <= accepted * std::fabs(v.mean))) continue;  // nor what is not known
         if (!best || work_of(figures, *v.setting) < work_of(figures, *best->setting)) best = &v;
       }
       if (!best) lines += fmt::format("| {} | {:g} % | none of those measured | | |\n", q.name, 100 * accepted);
