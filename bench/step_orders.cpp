@@ -7,6 +7,7 @@ namespace platen::bench {
 void table_of_orders(const StepOptions& o) {
   Table table("Order of tasks: bytes from memory for each particle and step, 32 steps, counted in a model of a cache",
               {{"particles", "particles", 10, 0},
+               {"workers", "workers", 8, 0},
                {"batches", "batches", 8, 0},
                {"touched", "touched", 9, 0},
                {"cache_MiB", "MiB", 6, 0},
@@ -20,10 +21,11 @@ void table_of_orders(const StepOptions& o) {
     sim->advance(1);
     const TaskTable by_step(sim->batches(), 32, false);
     const double per = 1.0 / (static_cast<double>(particles) * by_step.steps());
-    for (const double cache : {6.0 * (1 << 20), ordered_cache, 24.0 * (1 << 20)}) {
+    for (const auto& [workers, cache] : {std::pair{1, 6.0 * (1 << 20)}, {1, ordered_cache}, {1, 24.0 * (1 << 20)}, {2, ordered_cache}, {4, ordered_cache}, {8, 4.0 * (1 << 20)}}) {
       TaskTable ordered = by_step;
-      const double seconds = seconds_of([&] { ordered.reorder(order_for_cache(ordered, sim->batches(), cache)); });
+      const double seconds = seconds_of([&] { ordered.reorder(order_for_cache(ordered, sim->batches(), cache, workers)); });
       table.add({{"particles", particles},
+                 {"workers", workers},
                  {"batches", sim->counters().batches},
                  {"touched", touched_bytes(sim->batches()) / static_cast<double>(particles)},
                  {"cache_MiB", cache / (1 << 20)},

@@ -26,6 +26,9 @@ struct Schedule {
 Schedule schedule(const TaskTable& table, const std::vector<double>& cost, int workers) {
   const std::size_t count = table.tasks().size();
   std::vector<std::int32_t> waits = table.predecessors();
+  const std::vector<std::int32_t>& own = table.next_of_worker();  // a worker's next task waits for its last one
+  for (const std::int32_t next : own)
+    if (next >= 0) ++waits[static_cast<std::size_t>(next)];
   std::vector<double> chain(count, 0.0);
   std::priority_queue<std::int32_t, std::vector<std::int32_t>, std::greater<>> ready;
   using Running = std::pair<double, std::int32_t>;  // when it ends, task
@@ -51,6 +54,7 @@ Schedule schedule(const TaskTable& table, const std::vector<double>& cost, int w
       chain[static_cast<std::size_t>(next)] = std::max(chain[static_cast<std::size_t>(next)], chain[t]);
       if (--waits[static_cast<std::size_t>(next)] == 0) ready.push(next);
     }
+    if (!own.empty() && own[t] >= 0 && --waits[static_cast<std::size_t>(own[t])] == 0) ready.push(own[t]);
   }
   result.makespan = now;
   return result;
@@ -93,7 +97,7 @@ void table_of_schedules(const StepOptions& o) {
       ParallelForStep tasks(*sim, scene.law, scene.gravity, 1);
       const std::vector<ParallelForStep::BatchTimes> times = tasks.times(40);
       TaskTable graph(sim->batches(), 32, false);
-      order_if_large(graph, sim->batches(), ordered_cache);
+      order_if_large(graph, sim->batches(), ordered_cache, workers);
       const double overhead = overhead_of_a_task(graph);
       std::vector<double> cost;
       for (const Task& task : graph.tasks()) {

@@ -72,9 +72,9 @@ def make(folder):
               number(r["bytes"], 0), number(r["GB/s"]), number(r["memory_bound"]), f"{number(r['l2'], 0)} / {number(r['l3'], 0)}") for r in rows]))
     rows = rows_of(folder, "orders")
     if rows:
-        parts.append("### Order of tasks of large beds: bytes from memory for each particle and step, counted in a model of a cache\n\n" + table(
-            ("particles", "batches", "touched", "MiB of cache", "in the order of steps", "in the order for a cache", "ms to find it"),
-            [(f"{r['particles']:,}", r["batches"], number(r["touched"], 0), number(r["cache_MiB"], 0), number(r["by_step"], 0),
+        parts.append("### Order of tasks of large beds: bytes from memory for each particle and step, counted in a model of a cache\n\nSeveral workers have a part of the bed and a cache each.\n\n" + table(
+            ("particles", "workers", "batches", "touched", "MiB of each cache", "in the order of steps", "in the order for a cache", "ms to find it"),
+            [(f"{r['particles']:,}", r.get("workers", 1), r["batches"], number(r["touched"], 0), number(r["cache_MiB"], 0), number(r["by_step"], 0),
               number(r["ordered"], 0), number(r["milliseconds"], 1)) for r in rows]))
     rows = rows_of(folder, "schedule")
     if rows:

@@ -90,21 +90,29 @@ TaskTable::TaskTable(const std::vector<Batch>& batches, int steps, bool fused) :
   }
 }
 
-void TaskTable::reorder(const std::vector<std::int32_t>& order) {
+void TaskTable::reorder(const TaskOrder& order) {
   const std::size_t count = tasks_.size();
   std::vector<std::int32_t> place(count);
-  for (std::size_t k = 0; k < count; ++k) place[static_cast<std::size_t>(order[k])] = static_cast<std::int32_t>(k);
+  for (std::size_t k = 0; k < count; ++k) place[static_cast<std::size_t>(order.tasks[k])] = static_cast<std::int32_t>(k);
   std::vector<Task> tasks;
   std::vector<std::vector<std::int32_t>> successors;
   std::vector<std::int32_t> predecessors;
-  for (const std::int32_t t : order) {
+  for (const std::int32_t t : order.tasks) {
     const auto k = static_cast<std::size_t>(t);
     tasks.push_back(tasks_[k]), predecessors.push_back(predecessors_[k]);
     successors.push_back(std::move(successors_[k]));
     for (std::int32_t& next : successors.back()) next = place[static_cast<std::size_t>(next)];
   }
   tasks_ = std::move(tasks), successors_ = std::move(successors), predecessors_ = std::move(predecessors);
-  ordered_ = true;
+  ordered_ = true, worker_ = order.worker;
+  next_of_worker_.assign(order.worker.size(), -1);
+  std::vector<std::int32_t> next;  // of each worker, from the end on
+  for (std::size_t k = order.worker.size(); k-- > 0;) {
+    const auto worker = static_cast<std::size_t>(order.worker[k]);
+    if (worker >= next.size()) next.resize(worker + 1, -1);
+    next_of_worker_[k] = next[worker];
+    next[worker] = static_cast<std::int32_t>(k);
+  }
 }
 
 void TaskTable::remove_edge(std::int32_t from, std::int32_t to) {
@@ -164,8 +172,20 @@ struct FlowGraph::Graph {
   int steps = 0;
 };
 
+namespace {
+
+// The next task of the same batch, which always waits for this one; -1 at the end.
+std::int32_t next_of_batch(const TaskTable& table, std::size_t t) {
+  for (const std::int32_t next : table.successors()[t])
+    if (table.tasks()[static_cast<std::size_t>(next)].batch == table.tasks()[t].batch) return next;
+  return -1;
+}
+
+}  // namespace
+
 FlowGraph::FlowGraph(const TaskTable& table, TaskBody body) : graph_(std::make_unique<Graph>()) {
   Graph& g = *graph_;
+  const bool by_worker = !table.next_of_worker().empty();
   g.body = std::move(body);
   g.nodes.reserve(table.tasks().size());
   for (const Task& task : table.tasks()) {
@@ -173,17 +193,22 @@ FlowGraph::FlowGraph(const TaskTable& table, TaskBody body) : graph_(std::make_u
     g.nodes.push_back(std::make_unique<Graph::Node>(g.graph, [graph = graph_.get(), task](const tbb::flow::continue_msg&) {
       if (task.offset < graph->steps) graph->body(task);
       return tbb::flow::continue_msg();
-    }, table.ordered() ? priority : tbb::flow::no_priority));
+    }, table.ordered() && !by_worker ? priority : tbb::flow::no_priority));
   }
+  std::vector<bool> waits(table.tasks().size());
+  for (std::size_t t = 0; t < table.tasks().size(); ++t) waits[t] = table.predecessors()[t] > 0;
   for (std::size_t t = 0; t < table.tasks().size(); ++t) {
-    // The same batch's next task last: of those that a thread sets free it goes on with that one, whose arrays its caches hold, and
-    // leaves the others to be taken. Otherwise two threads may change batches at every task.
-    for (const bool own : {false, true})
-      for (std::int32_t next : table.successors()[t])
-        if ((table.tasks()[static_cast<std::size_t>(next)].batch == table.tasks()[t].batch) == own)
-          tbb::flow::make_edge(*g.nodes[t], *g.nodes[static_cast<std::size_t>(next)]);
-    if (table.predecessors()[t] == 0) g.roots.push_back(g.nodes[t].get());
+    const auto edge = [&](std::int32_t next) { tbb::flow::make_edge(*g.nodes[t], *g.nodes[static_cast<std::size_t>(next)]); };
+    // The last edge is that of the task to go on with, if it is ready: a thread keeps it, and leaves what else it sets free to be taken. Where
+    // tasks have workers it is the worker's next one, which waits for this one for no other reason; elsewhere the same batch's,
+    // whose arrays its caches hold. Otherwise two threads may change batches at every task.
+    const std::int32_t own = by_worker ? table.next_of_worker()[t] : next_of_batch(table, t);
+    for (const std::int32_t next : table.successors()[t])
+      if (next != own) edge(next);
+    if (own >= 0) edge(own), waits[static_cast<std::size_t>(own)] = true;
   }
+  for (std::size_t t = 0; t < waits.size(); ++t)
+    if (!waits[t]) g.roots.push_back(g.nodes[t].get());
 }
 
 FlowGraph::~FlowGraph() = default;

@@ -2,7 +2,7 @@
 //
 // The table is written down once in the order of the steps. Two tasks that touch the same resource,
 // at least one of them writing, keep that order: edges are derived, nobody writes them. It may be put into another order that keeps all edges; then one
-// thread takes the tasks as they come, more take the first that is ready. The same table runs serially,
+// thread takes the tasks as they come, more take the first that is ready, or each the next of its own. The same table runs serially,
 // as an oneTBB flow graph, or on plain threads that wait on their predecessors' flags (for ThreadSanitizer, which cannot
 // see through an uninstrumented libtbb).
 #pragma once
@@ -38,6 +38,11 @@ struct Access {
 };
 enum Resource { resource_state, resource_sums, resource_halo, resource_history, resource_totals, resource_count };
 
+struct TaskOrder {
+  std::vector<std::int32_t> tasks;   // tasks[k]: the task that comes k-th
+  std::vector<std::int32_t> worker;  // who takes it; empty: whoever is free
+};
+
 class TaskTable {
  public:
   TaskTable(const std::vector<Batch>& batches, int steps, bool fused);
@@ -49,7 +54,10 @@ class TaskTable {
   const std::vector<std::int32_t>& predecessors() const { return predecessors_; }  // their number
   // Whether the order of the tasks is meant [core/task_order.h]; otherwise a graph takes whichever is ready.
   bool ordered() const { return ordered_; }
-  void reorder(const std::vector<std::int32_t>& order);  // order[k] = task that comes k-th; must keep all edges
+  void reorder(const TaskOrder& order);  // must keep all edges
+  // Of each task, who takes it and which one that worker takes next, or -1; empty where any worker may take any task.
+  const std::vector<std::int32_t>& worker() const { return worker_; }
+  const std::vector<std::int32_t>& next_of_worker() const { return next_of_worker_; }
   std::vector<Access> accesses(const Task& task) const;
   void remove_edge(std::int32_t from, std::int32_t to);  // for tests that must see it missed
   std::string to_dot() const;                            // Graphviz
@@ -60,7 +68,7 @@ class TaskTable {
   std::vector<std::vector<int>> partners_, owners_;  // of each batch
   std::vector<Task> tasks_;
   std::vector<std::vector<std::int32_t>> successors_;
-  std::vector<std::int32_t> predecessors_;
+  std::vector<std::int32_t> predecessors_, worker_, next_of_worker_;
 };
 
 using TaskBody = std::function<void(const Task&)>;

@@ -25,17 +25,23 @@ inline constexpr double ordered_cache = 12 << 20;
 // What a step touches of these batches [bytes].
 double touched_bytes(const std::vector<Batch>& batches);
 
-// What a cache that forgets what was not touched for longest takes in from memory, if the tasks run as the table has them [bytes].
+// What a cache that forgets what was not touched for longest takes in from memory, if the tasks run as the table has them [bytes];
+// of such caches, one for each worker, where the tasks have workers.
 double bytes_from_memory(const TaskTable& table, const std::vector<Batch>& batches, double cache);
 
-// An order of the table's tasks that keeps all edges: order[k] = task that comes k-th. Greedy: of the batches that may go on
-// the one with the lowest price, which rises with what it needs from memory in such a cache of so many bytes, falls with the share of
+// An order of the table's tasks that keeps all edges. Greedy: of the batches that may go on
+// the one with the lowest price, which rises with what it needs from memory in a cache of so many bytes, falls with the share of
 // its neighbours that the cache holds, since those let each other go on, and rises a little with how far ahead it is.
 // Takes about (tasks) x (batches in the cache and around it) operations, and one look at all batches for each group far from the others.
-std::vector<std::int32_t> order_for_cache(const TaskTable& table, const std::vector<Batch>& batches, double bytes);
+//
+// Several workers have a part of the bed each, of equally many bytes along the curve, and a cache of their own: cores do
+// not always share one. Each has its own sequence of tasks; one waits for another's only at the border of their parts, and who
+// would have to wait how long is foreseen by the time that tasks should take.
+TaskOrder order_for_cache(const TaskTable& table, const std::vector<Batch>& batches, double bytes, int workers = 1);
 
 // Puts the tasks into such an order where the batches have more than twice the bytes; not where they are so small that hundreds
-// fit in, for which nobody asks but a case file's `batch`: the search would take longer than it saves.
-void order_if_large(TaskTable& table, const std::vector<Batch>& batches, double bytes);
+// fit in, for which nobody asks but a case file's `batch`: the search would take longer than it saves. Workers with too few batches to have
+// a part of their own take what comes next.
+void order_if_large(TaskTable& table, const std::vector<Batch>& batches, double bytes, int workers);
 
 }  // namespace platen

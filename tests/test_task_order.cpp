@@ -48,7 +48,7 @@ int loaded(const TaskTable& table, std::size_t places) {
 
 TaskTable ordered(const Simulation& sim, int steps, bool fused, double cache) {
   TaskTable table(sim.batches(), steps, fused);
-  table.reorder(order_for_cache(table, sim.batches(), cache));
+  table.reorder({order_for_cache(table, sim.batches(), cache).tasks, {}});
   return table;
 }
 
@@ -59,14 +59,14 @@ TEST(TaskOrder, KeepsTasksAndEdges) {
     for (const bool fused : {false, true})
       for (const double share : {0.0, 0.1, 0.5, 2.0}) {
         const TaskTable plain(sim.batches(), 5, fused);
-        const std::vector<std::int32_t> order = order_for_cache(plain, sim.batches(), share * touched_bytes(sim.batches()));
+        const std::vector<std::int32_t> order = order_for_cache(plain, sim.batches(), share * touched_bytes(sim.batches())).tasks;
         std::vector<std::int32_t> sorted = order;
         std::sort(sorted.begin(), sorted.end());
         ASSERT_EQ(sorted.size(), plain.tasks().size());
         for (std::size_t k = 0; k < sorted.size(); ++k) ASSERT_EQ(sorted[k], static_cast<std::int32_t>(k));
 
         TaskTable table = plain;
-        table.reorder(order);
+        table.reorder({order, {}});
         EXPECT_FALSE(plain.ordered());
         EXPECT_TRUE(table.ordered());
         for (std::size_t k = 0; k < order.size(); ++k) {
@@ -120,7 +120,7 @@ TEST(TaskOrder, TinyBatchesAreLeftInTheOrderOfSteps) {
   for (Batch& b : batches) b.count = 8;
   for (const double share : {0.01, 0.4}) {  // 20 and 800 of them fit in
     TaskTable table(batches, 2, false);
-    order_if_large(table, batches, share * touched_bytes(batches));
+    order_if_large(table, batches, share * touched_bytes(batches), 1);
     EXPECT_EQ(table.ordered(), share < 0.1);
   }
 }
@@ -191,6 +191,115 @@ TEST(TaskOrder, AGraphRunsEveryTaskOnceAndInOrder) {
           if (later.offset >= steps) continue;
           EXPECT_LT(place.at(key(table.tasks()[t])), place.at(key(later)));
         }
+      }
+    }
+}
+
+TaskTable parted(const Simulation& sim, int steps, bool fused, int workers) {
+  TaskTable table(sim.batches(), steps, fused);
+  table.reorder(order_for_cache(table, sim.batches(), touched_bytes(sim.batches()) / 8.0, workers));
+  return table;
+}
+
+// Each worker has a part of the bed to itself, all parts alike, and its tasks in the order of the table.
+TEST(TaskOrder, WorkersHavePartsOfTheBed) {
+  Simulation sim = long_bed(64);
+  sim.ensure_forces();
+  const std::size_t batches = sim.batches().size();
+  for (const int workers : {1, 2, 3, 7}) {
+    const TaskTable table = parted(sim, 6, false, workers);
+    ASSERT_EQ(table.worker().size(), table.tasks().size());
+    std::vector<int> owner(batches, -1), last(static_cast<std::size_t>(workers), -1), tasks(static_cast<std::size_t>(workers), 0);
+    for (std::size_t k = 0; k < table.tasks().size(); ++k) {
+      const int w = table.worker()[k];
+      ASSERT_TRUE(w >= 0 && w < workers);
+      int& own = owner[static_cast<std::size_t>(table.tasks()[k].batch)];
+      EXPECT_TRUE(own < 0 || own == w);
+      own = w;
+      int& before = last[static_cast<std::size_t>(w)];
+      if (before >= 0) {
+        EXPECT_EQ(table.next_of_worker()[static_cast<std::size_t>(before)], static_cast<std::int32_t>(k));
+      }
+      before = static_cast<int>(k);
+      ++tasks[static_cast<std::size_t>(w)];
+      for (const std::int32_t next : table.successors()[k]) EXPECT_GT(next, static_cast<std::int32_t>(k));
+    }
+    for (const int end : last) EXPECT_EQ(table.next_of_worker()[static_cast<std::size_t>(end)], -1);
+    EXPECT_TRUE(std::is_sorted(owner.begin(), owner.end()));
+    for (const int n : tasks) EXPECT_NEAR(n, static_cast<double>(table.tasks().size()) / workers, 0.35 * static_cast<double>(table.tasks().size()) / workers);
+  }
+}
+
+// Two caches of one size hold together what one of twice the size does, if both work side by side.
+TEST(TaskOrder, PartsNeedNoMoreFromMemory) {
+  Simulation sim = long_bed(64);
+  sim.ensure_forces();
+  const double all = touched_bytes(sim.batches());
+  const TaskTable by_step(sim.batches(), 16, false);
+  const auto brought = [&](int workers, double cache) {
+    TaskTable table = by_step;
+    table.reorder(order_for_cache(table, sim.batches(), cache, workers));
+    return bytes_from_memory(table, sim.batches(), cache);
+  };
+  EXPECT_LT(brought(2, all / 6.0), 0.5 * bytes_from_memory(by_step, sim.batches(), all / 3.0));
+  EXPECT_LT(brought(2, all / 6.0), 1.6 * brought(1, all / 3.0));
+}
+
+// A thread that has done a task goes on with its worker's next one, if that waits for nothing else; nobody takes one before its turn.
+TEST(TaskOrder, AThreadStaysWithItsWorker) {
+  Simulation sim = long_bed(64);
+  sim.ensure_forces();
+  for (const bool fused : {false, true}) {
+    const TaskTable table = parted(sim, 6, fused, 3);
+    std::map<std::tuple<int, int, int>, std::size_t> index;
+    const auto key = [](const Task& task) { return std::tuple(static_cast<int>(task.kind), task.batch, task.offset); };
+    for (std::size_t t = 0; t < table.tasks().size(); ++t) index[key(table.tasks()[t])] = t;
+    std::vector<std::size_t> done;
+    tbb::task_arena one(1);
+    one.execute([&] {
+      FlowGraph graph(table, [&](const Task& task) { done.push_back(index.at(key(task))); });
+      graph.run(table.steps());
+    });
+    ASSERT_EQ(done.size(), table.tasks().size());
+    std::vector<std::int32_t> waits = table.predecessors();
+    std::vector<std::int32_t> last(3, -1);
+    for (std::size_t k = 0; k < done.size(); ++k) {
+      const std::size_t t = done[k];
+      const auto w = static_cast<std::size_t>(table.worker()[t]);
+      EXPECT_EQ(waits[t], 0);
+      EXPECT_LT(last[w], static_cast<std::int32_t>(t));
+      last[w] = static_cast<std::int32_t>(t);
+      for (const std::int32_t next : table.successors()[t]) --waits[static_cast<std::size_t>(next)];
+      const std::int32_t own = table.next_of_worker()[t];
+      if (own >= 0 && waits[static_cast<std::size_t>(own)] == 0) {
+        EXPECT_EQ(done[k + 1], static_cast<std::size_t>(own));
+      }
+    }
+  }
+}
+
+TEST(TaskOrder, ManyThreadsTakeThePartsInOrder) {
+  Simulation sim = long_bed(64);
+  sim.ensure_forces();
+  const TaskTable table = parted(sim, 6, false, 3);
+  std::map<std::tuple<int, int, int>, std::size_t> index;
+  const auto key = [](const Task& task) { return std::tuple(static_cast<int>(task.kind), task.batch, task.offset); };
+  for (std::size_t t = 0; t < table.tasks().size(); ++t) index[key(table.tasks()[t])] = t;
+  for (const int steps : {1, 4, 6})
+    for (int repetition = 0; repetition < 20; ++repetition) {
+      std::mutex mutex;
+      std::vector<std::size_t> place(table.tasks().size(), 0), done;
+      FlowGraph(table, [&](const Task& task) {
+        const std::lock_guard<std::mutex> lock(mutex);
+        done.push_back(index.at(key(task)));
+        place[done.back()] = done.size();
+      }).run(steps);
+      EXPECT_EQ(done.size(), sim.batches().size() * 2 * static_cast<std::size_t>(steps));
+      for (const std::size_t t : done) {
+        std::vector<std::int32_t> after = table.successors()[t];
+        if (table.next_of_worker()[t] >= 0) after.push_back(table.next_of_worker()[t]);
+        for (const std::int32_t next : after)
+          EXPECT_TRUE(place[static_cast<std::size_t>(next)] == 0 || place[t] < place[static_cast<std::size_t>(next)]);
       }
     }
 }
