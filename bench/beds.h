@@ -61,6 +61,7 @@ struct BenchEngine {
   int threads = 1;
   int batch = 0;                 // particles; 0 = chosen, here and below
   double skin = 0.0, gap = 0.0;  // [m]
+  double cache = 0.0;            // that the order of a large bed's tasks counts on [bytes]; 0: chosen
   int unroll = 0;                // most steps between two looks at the lists
   Executor executor = Executor::automatic;
   bool fused = false;  // one task per batch and step

@@ -89,6 +89,7 @@ std::unique_ptr<Simulation> make_simulation(const Bed& bed, const BenchScene& sc
   setup.engine.threads = engine.threads;
   setup.engine.batch = engine.batch;
   setup.engine.skin = engine.skin, setup.engine.inner_gap = engine.gap;
+  if (engine.cache > 0.0) setup.engine.cache = engine.cache;
   if (engine.unroll > 0) setup.engine.unroll = engine.unroll;
   setup.engine.executor = engine.executor;
   setup.engine.fused = engine.fused;

@@ -73,6 +73,7 @@ const Column particles_column{"particles", "particles", 10, 0}, set_column{"set"
 BenchEngine engine_of(const StepOptions& o, InstructionSet set, int threads) {
   BenchEngine engine;
   engine.set = set, engine.threads = threads, engine.batch = o.batch, engine.unroll = o.unroll;
+  engine.cache = o.cache * (1 << 20);
   engine.skin = o.skin * bench_radius, engine.gap = o.gap * bench_radius;
   return engine;
 }

@@ -21,6 +21,7 @@ struct StepOptions {
   int warm = 500;                    // steps before anything is timed
   int rounds = 5;
   int batch = 0, unroll = 0;     // 0 = chosen
+  double cache = 0.0;            // [MiB]; 0 = chosen
   double skin = 0.0, gap = 0.0;  // of lists, in radii; 0 = chosen
   std::string json;
   std::filesystem::path beds;

@@ -19,7 +19,7 @@ namespace {
 struct Schedule {
   double makespan = 0.0;  // [s]
   double work = 0.0;      // sum of all tasks [s]
-  double longest = 0.0;   // longest chain of tasks that wait for each other [s]
+  double longest = 0.0;   // longest chain of tasks that need each other's results [s]
 };
 
 // Whoever is free takes the first ready task in the order of the table.

@@ -64,7 +64,7 @@ void Simulation::setup_particles(const SphereTable& table) {
   needed.energy = engine_.energy;
   KernelRequest request;
   request.needed = needed;
-  request.rolling = true;
+  request.rolling = needed.rolling == Rolling::absolute || plate_parameters_.rolling_friction > 0.0;
   request.reproducible = engine_.reproducible;
   request.scene = engine_.scene;
   kernels_ = choose_kernels(engine_.instruction_set, request);

@@ -67,7 +67,6 @@ struct SimulationSetup {
   double gravity = 9.81;    // along -z [m/s2]
   double width = 0.0, depth = 0.0;  // of the box [m]; 0 where there is none
   bool periodic = false;
-  bool plates_roll = true;  // planes may be present, so their rolling friction counts for the choice of kernels
   EngineOptions engine;
 };
 

@@ -200,7 +200,7 @@ FlowGraph::FlowGraph(const TaskTable& table, TaskBody body) : graph_(std::make_u
   for (std::size_t t = 0; t < table.tasks().size(); ++t) {
     const auto edge = [&](std::int32_t next) { tbb::flow::make_edge(*g.nodes[t], *g.nodes[static_cast<std::size_t>(next)]); };
     // The last edge is that of the task to go on with, if it is ready: a thread keeps it, and leaves what else it sets free to be taken. Where
-    // tasks have workers it is the worker's next one, which waits for this one for no other reason; elsewhere the same batch's,
+    // tasks have workers it is the worker's next one, which waits for this one even if it needs nothing from it; elsewhere the same batch's,
     // whose arrays its caches hold. Otherwise two threads may change batches at every task.
     const std::int32_t own = by_worker ? table.next_of_worker()[t] : next_of_batch(table, t);
     for (const std::int32_t next : table.successors()[t])

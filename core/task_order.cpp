@@ -1,6 +1,7 @@
 #include "core/task_order.h"
 
 #include <algorithm>
+#include <cassert>
 #include <functional>
 #include <queue>
 #include <tuple>
@@ -60,7 +61,7 @@ std::vector<int> parts_of(const std::vector<Batch>& batches, int workers) {
 class Caches {
  public:
   Caches(const std::vector<Batch>& batches, const std::vector<int>& worker, double bytes)
-      : capacity_(bytes), worker_(worker), near_(batches.size(), 0), around_(batches.size()) {
+      : capacity_(bytes), worker_(worker), near_(batches.size(), 0) {
     for (const Batch& b : batches) {
       size_.push_back(state_bytes(b)), size_.push_back(contact_bytes(b));
       std::vector<int> all = b.partners;
@@ -70,11 +71,13 @@ class Caches {
       neighbours_.push_back(std::move(all));
     }
     last_use_.assign(size_.size(), -1);
-    one_.resize(static_cast<std::size_t>(worker.empty() ? 0 : *std::max_element(worker.begin(), worker.end())) + 1);
+    const int workers = worker.empty() ? 1 : *std::max_element(worker.begin(), worker.end()) + 1;
+    one_.resize(static_cast<std::size_t>(workers));
+    around_.assign(static_cast<std::size_t>(workers), Subset(batches.size()));
   }
 
-  // Batches that are in a cache or have a neighbour in one.
-  const std::vector<int>& around() const { return around_.members(); }
+  // Batches of a worker that are in its cache or have a neighbour in any.
+  const std::vector<int>& around(std::size_t worker) const { return around_[worker].members(); }
   double missing(const Task& task) const {
     const auto state = 2 * static_cast<std::size_t>(task.batch);
     return (holds(state) ? 0.0 : size_[state]) + (task.kind == TaskKind::integrate || holds(state + 1) ? 0.0 : size_[state + 1]);
@@ -124,10 +127,11 @@ class Caches {
     update_around(batch);
   }
   void update_around(int b) {
+    Subset& around = around_[static_cast<std::size_t>(worker_[static_cast<std::size_t>(b)])];
     if (near_[static_cast<std::size_t>(b)] > 0 || holds(2 * static_cast<std::size_t>(b)))
-      around_.add(b);
+      around.add(b);
     else
-      around_.remove(b);
+      around.remove(b);
   }
 
   double capacity_, taken_in_ = 0.0;
@@ -137,7 +141,7 @@ class Caches {
   std::vector<Cache> one_;              // of each worker
   std::vector<std::vector<int>> neighbours_;
   std::vector<int> near_;  // neighbours whose states are held
-  Subset around_;
+  std::vector<Subset> around_;  // of each worker
 };
 
 // The search for an order: workers take tasks at the times at which they would, each of its own batches and for its own cache.
@@ -168,6 +172,7 @@ class Planner {
       for (const std::int32_t next : table_.successors()[static_cast<std::size_t>(t)])
         if (--waits_[static_cast<std::size_t>(next)] == 0) set_free(next);
     }
+    for (; !running.empty(); running.pop()) now_ = std::get<0>(running.top());
     return std::move(order_);
   }
   // Of the order found, waiting for each other included [times of a contact].
@@ -180,6 +185,7 @@ class Planner {
 
   // Tasks of one batch follow each other, so each batch has one that is ready or none.
   void set_free(std::int32_t t) {
+    assert(ready_[static_cast<std::size_t>(task(t).batch)] < 0);
     ready_[static_cast<std::size_t>(task(t).batch)] = t;
     ++ready_tasks_[worker_of(t)];
   }
@@ -202,9 +208,9 @@ class Planner {
     constexpr double neighbours_weigh = 3.0;
     std::int32_t best = -1;
     double best_price = 0.0;
-    for (const int b : caches_.around()) {
+    for (const int b : caches_.around(w)) {
       const std::int32_t t = ready_[static_cast<std::size_t>(b)];
-      if (t < 0 || worker_of(t) != w) continue;
+      if (t < 0) continue;
       const int phase = 2 * task(t).offset + (task(t).kind == TaskKind::contacts ? 1 : 0);
       const double price = caches_.missing(task(t)) / mean_ + phase_weighs_ * phase - neighbours_weigh * caches_.share_of_neighbours(b);
       if (best < 0 || price < best_price || (price == best_price && t < best)) best = t, best_price = price;
@@ -252,18 +258,18 @@ TaskOrder order_for_cache(const TaskTable& table, const std::vector<Batch>& batc
   // No weight of how far a batch is ahead suits every bed; these two differ by up to 6 %.
   Planner even(table, batches, bytes, workers, 0.08), far(table, batches, bytes, workers, 0.04);
   TaskOrder a = even.plan(), b = far.plan();
-  return even.time() < far.time() ? a : b;
+  if (far.time() <= even.time()) a = std::move(b);
+  if (workers == 1) a.worker.clear();
+  return a;
 }
 
 void order_if_large(TaskTable& table, const std::vector<Batch>& batches, double bytes, int workers) {
   const double touched = touched_bytes(batches), of_batch = touched / static_cast<double>(std::max<std::size_t>(batches.size(), 1));
   if (touched <= 2.0 * bytes || 256.0 * of_batch <= bytes) return;
   const bool parts = workers > 1 && batches.size() >= least_batches_of_worker * static_cast<std::size_t>(workers);
-  // Up to eight cores share a third cache.
-  const double own = parts ? std::min(bytes, std::max(bytes / 3.0, 2.0 * bytes / workers)) : bytes;
-  TaskOrder order = order_for_cache(table, batches, own, parts ? workers : 1);
-  if (!parts) order.worker.clear();
-  table.reorder(order);
+  // Up to eight cores share a third cache, of some three times what one may count on.
+  const double own = parts ? std::min(bytes, bytes * 8.0 / (3.0 * std::min(workers, 8))) : bytes;
+  table.reorder(order_for_cache(table, batches, own, parts ? workers : 1));
 }
 
 }  // namespace platen

@@ -49,15 +49,18 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
     u = add_scaled<I>(u, turn, Vec3<I>{f[4], f[5], f[6]});
     if constexpr (rolling) {
       const Real strength = I::set(c.mu_r) * f[3] + f[7];
-      const Vec3<I> slowed = slowed_spin<I>(u, strength * turn);
-      if constexpr (energy) {
-        // Work of rolling friction: what it took off the spin, times the mean spin of the kick. The other torques do
-        // theirs over the same spin. At rest, where it holds a torque and nothing turns, it takes nothing.
-        const Real lost = (I::set(0.2) * m) * dot(u - slowed, u_before + slowed);
-        const Real magic = I::set(c.energy.magic);
-        rolled = rolled + ((lost + magic) - magic);
+      // Where nothing brakes no spin is changed by a bit; a root and a division are a quarter of a sphere's motion.
+      if (I::any(I::negate(zero >= strength))) {
+        const Vec3<I> slowed = slowed_spin<I>(u, strength * turn);
+        if constexpr (energy) {
+          // Work of rolling friction: what it took off the spin, times the mean spin of the kick. The other torques do
+          // theirs over the same spin. At rest, where it holds a torque and nothing turns, it takes nothing.
+          const Real lost = (I::set(0.2) * m) * dot(u - slowed, u_before + slowed);
+          const Real magic = I::set(c.energy.magic);
+          rolled = rolled + ((lost + magic) - magic);
+        }
+        u = slowed;
       }
-      u = slowed;
     }
 
     Vec3<I> x = {I::load(b.x + k), I::load(b.y + k), I::load(b.z + k)};

@@ -48,7 +48,7 @@ int loaded(const TaskTable& table, std::size_t places) {
 
 TaskTable ordered(const Simulation& sim, int steps, bool fused, double cache) {
   TaskTable table(sim.batches(), steps, fused);
-  table.reorder({order_for_cache(table, sim.batches(), cache).tasks, {}});
+  table.reorder(order_for_cache(table, sim.batches(), cache));
   return table;
 }
 
@@ -206,7 +206,8 @@ TEST(TaskOrder, WorkersHavePartsOfTheBed) {
   Simulation sim = long_bed(64);
   sim.ensure_forces();
   const std::size_t batches = sim.batches().size();
-  for (const int workers : {1, 2, 3, 7}) {
+  EXPECT_TRUE(parted(sim, 6, false, 1).worker().empty());
+  for (const int workers : {2, 3, 7}) {
     const TaskTable table = parted(sim, 6, false, workers);
     ASSERT_EQ(table.worker().size(), table.tasks().size());
     std::vector<int> owner(batches, -1), last(static_cast<std::size_t>(workers), -1), tasks(static_cast<std::size_t>(workers), 0);
@@ -224,6 +225,7 @@ TEST(TaskOrder, WorkersHavePartsOfTheBed) {
       ++tasks[static_cast<std::size_t>(w)];
       for (const std::int32_t next : table.successors()[k]) EXPECT_GT(next, static_cast<std::int32_t>(k));
     }
+    for (const int end : last) ASSERT_GE(end, 0);
     for (const int end : last) EXPECT_EQ(table.next_of_worker()[static_cast<std::size_t>(end)], -1);
     EXPECT_TRUE(std::is_sorted(owner.begin(), owner.end()));
     for (const int n : tasks) EXPECT_NEAR(n, static_cast<double>(table.tasks().size()) / workers, 0.35 * static_cast<double>(table.tasks().size()) / workers);
@@ -243,6 +245,19 @@ TEST(TaskOrder, PartsNeedNoMoreFromMemory) {
   };
   EXPECT_LT(brought(2, all / 6.0), 0.5 * bytes_from_memory(by_step, sim.batches(), all / 3.0));
   EXPECT_LT(brought(2, all / 6.0), 1.6 * brought(1, all / 3.0));
+}
+
+TEST(TaskOrder, MoreWorkersThanBatches) {
+  for (const std::size_t count : {0u, 1u, 3u}) {
+    std::vector<Batch> batches(count);
+    for (Batch& b : batches) b.count = 64, b.padded = 16;
+    TaskTable table(batches, 4, false);
+    table.reorder(order_for_cache(table, batches, 1e3, 5));
+    int done = 0;
+    tbb::task_arena one(1);
+    one.execute([&] { FlowGraph(table, [&](const Task&) { ++done; }).run(4); });
+    EXPECT_EQ(done, static_cast<int>(8 * count));
+  }
 }
 
 // A thread that has done a task goes on with its worker's next one, if that waits for nothing else; nobody takes one before its turn.
@@ -289,17 +304,24 @@ TEST(TaskOrder, ManyThreadsTakeThePartsInOrder) {
     for (int repetition = 0; repetition < 20; ++repetition) {
       std::mutex mutex;
       std::vector<std::size_t> place(table.tasks().size(), 0), done;
-      FlowGraph(table, [&](const Task& task) {
-        const std::lock_guard<std::mutex> lock(mutex);
-        done.push_back(index.at(key(task)));
-        place[done.back()] = done.size();
-      }).run(steps);
+      tbb::task_arena many(3);
+      many.execute([&] {
+        FlowGraph(table, [&](const Task& task) {
+          const std::lock_guard<std::mutex> lock(mutex);
+          done.push_back(index.at(key(task)));
+          place[done.back()] = done.size();
+        }).run(steps);
+      });
       EXPECT_EQ(done.size(), sim.batches().size() * 2 * static_cast<std::size_t>(steps));
       for (const std::size_t t : done) {
-        std::vector<std::int32_t> after = table.successors()[t];
-        if (table.next_of_worker()[t] >= 0) after.push_back(table.next_of_worker()[t]);
-        for (const std::int32_t next : after)
+        for (const std::int32_t next : table.successors()[t])
           EXPECT_TRUE(place[static_cast<std::size_t>(next)] == 0 || place[t] < place[static_cast<std::size_t>(next)]);
+      }
+      std::vector<std::int32_t> last(3, -1);
+      for (const std::size_t t : done) {
+        std::int32_t& before = last[static_cast<std::size_t>(table.worker()[t])];
+        EXPECT_LT(before, static_cast<std::int32_t>(t));
+        before = static_cast<std::int32_t>(t);
       }
     }
 }
