@@ -1,10 +1,15 @@
 #include "bench/reference_loops.h"
 
 #include <immintrin.h>
+#include <pthread.h>
+#include <sched.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <map>
+#include <thread>
+#include <vector>
 
 #include "bench/harness.h"
 #include "core/aligned.h"
@@ -113,6 +118,41 @@ double read_rate(InstructionSet set, std::size_t bytes, double seconds) {
                    [&] { return read(array.data(), array.size()); });
 }
 
+// Two threads, one on each of the first two processors, write to the same line in turn. Some 50 ns where they share a third cache,
+// several times as long where they do not: a hypervisor may move a machine between the two.
+double round_trip() {
+  cpu_set_t allowed;
+  CPU_ZERO(&allowed);
+  if (sched_getaffinity(0, sizeof allowed, &allowed) != 0) return 0.0;
+  std::vector<int> processors;
+  for (int k = 0; k < CPU_SETSIZE && processors.size() < 2; ++k)
+    if (CPU_ISSET(k, &allowed)) processors.push_back(k);
+  if (processors.size() < 2) return 0.0;
+  alignas(64) std::atomic<int> line{0};
+  constexpr int turns = 4000, parts = 5;
+  double taken[parts] = {};
+  const auto play = [&](int me) {
+    cpu_set_t one;
+    CPU_ZERO(&one);
+    CPU_SET(processors[static_cast<std::size_t>(me)], &one);
+    pthread_setaffinity_np(pthread_self(), sizeof one, &one);
+    for (int part = 0; part < parts; ++part) {
+      const double start = seconds_now();
+      for (int turn = 0; turn < turns; ++turn) {
+        const int mine = 2 * (part * turns + turn) + me;
+        while (line.load(std::memory_order_acquire) != mine) {
+        }
+        line.store(mine + 1, std::memory_order_release);
+      }
+      if (me == 0) taken[part] = seconds_now() - start;
+    }
+  };
+  std::thread first(play, 0), second(play, 1);
+  first.join(), second.join();
+  std::sort(taken, taken + parts);
+  return 1e9 * taken[parts / 2] / turns;
+}
+
 std::size_t cache_size(int name, std::size_t otherwise) {
   const long size = sysconf(name);
   return size > 0 ? static_cast<std::size_t>(size) : otherwise;
@@ -130,6 +170,7 @@ ReferenceLoops reference_loops(InstructionSet set, double seconds) {
   loops.fma = best_rate(seconds, 1e-9 * 2.0 * chains * width * turns, [&] { return fma(turns); });
   loops.l2 = read_rate(set, l2 / 2, seconds);
   loops.l3 = read_rate(set, std::clamp(l3 / 4, 2 * l2, std::size_t{16} << 20), seconds);
+  loops.cores = round_trip();
   return loops;
 }
 
@@ -138,7 +179,7 @@ void add_reference(nlohmann::json& row, InstructionSet set) {
   const ReferenceLoops loops = reference_loops(set);
   double& most = largest[set];
   most = std::max(most, loops.fma);
-  row["fma"] = loops.fma, row["l2"] = loops.l2, row["l3"] = loops.l3;
+  row["fma"] = loops.fma, row["l2"] = loops.l2, row["l3"] = loops.l3, row["cores"] = loops.cores;
   row["state"] = loops.fma / most;
 }
 

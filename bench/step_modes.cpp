@@ -65,7 +65,7 @@ Variant stepping(const std::string& name, Simulation& sim, std::int64_t steps) {
 
 const Column particles_column{"particles", "particles", 10, 0}, set_column{"set", "isa", 8, 0},
     scene_column{"scene", "scene", 17, 0}, z_column{"Z", "Z", 7, 2}, fma_column{"fma", "FMA Gf/s", 10, 1},
-    l2_column{"l2", "L2 GB/s", 9, 0}, l3_column{"l3", "L3 GB/s", 9, 0}, state_column{"state", "state", 7, 2},
+    l2_column{"l2", "L2 GB/s", 9, 0}, l3_column{"l3", "L3 GB/s", 9, 0}, cores_column{"cores", "cores ns", 9, 0}, state_column{"state", "state", 7, 2},
     hash_column{"hash", "hash after warm-up", 20, 0};
 
 }  // namespace
@@ -94,6 +94,7 @@ void table_of_steps(const StepOptions& o) {
                                                  fma_column,
                                                  l2_column,
                                                  l3_column,
+                                                 cores_column,
                                                  state_column,
                                                  hash_column});
   for (const std::int64_t particles : either(o.particles, {5000, 35000})) {
@@ -134,6 +135,7 @@ void table_of_threads(const StepOptions& o) {
                                                           fma_column,
                                                           l2_column,
                                                           l3_column,
+                                                          cores_column,
                                                           state_column});
   const std::vector<int> given = either(o.threads, {2});
   const int many = *std::max_element(given.begin(), given.end());
@@ -222,6 +224,7 @@ bool table_of_scalar(const StepOptions& o) {
                fma_column,
                l2_column,
                l3_column,
+               cores_column,
                state_column});
   if (!ScalarStep::available()) {
     fmt::print("  skipped: the yardstick is built for AVX2 and FMA, which this processor lacks\n");
@@ -272,6 +275,7 @@ void table_of_rebuilds(const StepOptions& o) {
                                                                                 fma_column,
                                                                                 l2_column,
                                                                                 l3_column,
+                                                                                cores_column,
                                                                                 state_column});
   for (const std::int64_t particles : either(o.particles, {35000}))
     for (const int threads : either(o.threads, {1, 2})) {

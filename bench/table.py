@@ -30,7 +30,9 @@ def table(headings, lines):
 
 
 def state(row):
-    return f"{number(row.get('fma'), 0)} / {number(row.get('l2'), 0)} / {number(row.get('l3'), 0)}"
+    """Of the machine; with what lies between two cores where more than one thread ran."""
+    cores = f" / {number(row['cores'], 0)} ns" if row.get("cores") and row.get("threads", 1) > 1 else ""
+    return f"{number(row.get('fma'), 0)} / {number(row.get('l2'), 0)} / {number(row.get('l3'), 0)}{cores}"
 
 
 def make(folder):
@@ -45,7 +47,7 @@ def make(folder):
                           number(r.get("ns")), number(r["Z"], 2), number(r.get("memory"), 0), r["rebuilds"], state(r)))
         parts.append(f"### Whole step, scene `full`, {rows[0]['set']}\n\n" + table(
             ("particles", "threads", "M particle-steps/s", "asked", "best block", "ns per contact and core", "Z",
-             "bytes per particle", "rebuilds", "FMA Gflop/s / L2 / L3 GB/s"), lines))
+             "bytes per particle", "rebuilds", "FMA Gflop/s / L2 / L3 GB/s / between cores"), lines))
     rows = rows_of(folder, "scalar")
     if rows:
         parts.append("### Against the plain scalar half-list step, one thread\n\n" + table(
@@ -55,7 +57,7 @@ def make(folder):
     rows = rows_of(folder, "threads")
     if rows:
         parts.append("### One thread against many\n\n" + table(
-            ("particles", "threads", "M/s, one", "M/s, many", "speed-up (asked 1.75 on 2)", "pairs", "dropped", "same bits", "FMA / L2 / L3"),
+            ("particles", "threads", "M/s, one", "M/s, many", "speed-up (asked 1.75 on 2)", "pairs", "dropped", "same bits", "FMA / L2 / L3 / between cores"),
             [(f"{r['particles']:,}", r["threads"], number(r["rate_one"]), number(r["rate"]), number(r["speedup"], 2), r["rounds"],
               r["dropped"], "yes" if r["same"] else "NO", state(r)) for r in rows]))
     rows = rows_of(folder, "executors")
