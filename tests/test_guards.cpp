@@ -66,6 +66,31 @@ TEST(Guards, AVelocityThatIsNoNumber) {
         }
 }
 
+// Of a sphere that touches nobody, in beds with and without rolling friction and energy terms.
+TEST(Guards, ASpinThatIsNoNumberOfAFreeSphere) {
+  for (const InstructionSet set : available_instruction_sets())
+    for (const double mu_r : {0.0, 0.01})
+      for (const bool energy : {true, false})
+        for (const double wrong : {0.0, nan, inf, -inf}) {
+          EngineOptions engine;
+          engine.instruction_set = set, engine.energy = energy;
+          PairLaw law = scenes::full_law();
+          law.rolling_friction = mu_r;
+          scenes::BedOptions options;
+          options.spacing = 3.0;
+          SimulationSetup setup = scenes::bed(options, law, engine);
+          setup.plate.rolling_friction = mu_r;
+          Simulation sim(std::move(setup));
+          sim.set_time_step(2e-6);
+          sim.advance(20);
+          const_cast<Particles&>(sim.state()).uy[40] = wrong;
+          const_cast<Particles&>(sim.state()).write_rows();
+          const std::string said = said_by(sim, 32);
+          EXPECT_EQ(said.empty(), wrong == 0.0) << said;
+          EXPECT_TRUE(wrong == 0.0 || said.find("a smaller time step") != std::string::npos) << said;
+        }
+}
+
 TEST(Guards, ASphereAsFastAsNoneCanBe) {
   for (const InstructionSet set : available_instruction_sets()) {
     const std::string said = said_after(set, 1, [](Particles& p, std::vector<Batch>&, std::size_t k) { p.vz[k] = 5e3; });
