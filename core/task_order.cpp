@@ -144,13 +144,19 @@ class Caches {
   std::vector<Subset> around_;  // of each worker
 };
 
+double mean_pairs(const std::vector<Batch>& batches) {
+  double sum = 0.0;
+  for (const Batch& b : batches) sum += b.padded;
+  return sum / static_cast<double>(std::max<std::size_t>(batches.size(), 1));
+}
+
 // The search for an order: workers take tasks at the times at which they would, each of its own batches and for its own cache.
 class Planner {
  public:
   Planner(const TaskTable& table, const std::vector<Batch>& batches, double bytes, int workers, double phase_weighs)
       : phase_weighs_(phase_weighs), table_(table), batches_(batches), waits_(table.predecessors()), ready_(batches.size(), -1), worker_(parts_of(batches, workers)),
         caches_(batches, worker_, bytes), ready_tasks_(static_cast<std::size_t>(workers), 0),
-        mean_(touched_bytes(batches) / (2.0 * static_cast<double>(std::max<std::size_t>(batches.size(), 1)))) {
+        late_(mean_pairs(batches)), mean_(touched_bytes(batches) / (2.0 * static_cast<double>(std::max<std::size_t>(batches.size(), 1)))) {
     for (std::size_t t = 0; t < waits_.size(); ++t)
       if (waits_[t] == 0) set_free(static_cast<std::int32_t>(t));
   }
@@ -166,20 +172,27 @@ class Planner {
         running.push({now_ + time_of(task(t), missing), w, t});
         busy[w] = true;
       }
-      const auto [end, w, t] = running.top();
+      const auto [when, w, t] = running.top();
       running.pop();
-      now_ = end, busy[w] = false;
+      now_ = when;
+      const bool others = w == busy.size();  // it is the others who hear of it
+      if (!others) {
+        busy[w] = false;
+        finished_ = when;
+        running.push({when + late_, busy.size(), t});
+      }
       for (const std::int32_t next : table_.successors()[static_cast<std::size_t>(t)])
-        if (--waits_[static_cast<std::size_t>(next)] == 0) set_free(next);
+        if ((worker_of(next) != worker_of(t)) == others && --waits_[static_cast<std::size_t>(next)] == 0) set_free(next);
     }
-    for (; !running.empty(); running.pop()) now_ = std::get<0>(running.top());
+    for (; !running.empty(); running.pop())
+      if (std::get<1>(running.top()) < busy.size()) finished_ = std::get<0>(running.top());
     return std::move(order_);
   }
   // Of the order found, waiting for each other included [times of a contact].
-  double time() const { return now_; }
+  double time() const { return finished_; }
 
  private:
-  using Running = std::tuple<double, std::size_t, std::int32_t>;  // when it ends, worker, task
+  using Running = std::tuple<double, std::size_t, std::int32_t>;  // when it ends, worker, task; when others hear of it, number of workers, task
   const Task& task(std::int32_t t) const { return table_.tasks()[static_cast<std::size_t>(t)]; }
   std::size_t worker_of(std::int32_t t) const { return static_cast<std::size_t>(worker_[static_cast<std::size_t>(task(t).batch)]); }
 
@@ -230,9 +243,11 @@ class Planner {
   std::vector<int> worker_;           // of each batch
   Caches caches_;
   std::vector<int> ready_tasks_;      // of each worker
+  // Other workers count on a task this much later, about the time of one: what takes longer than foreseen then keeps nobody waiting.
+  double late_;
   double mean_;
   TaskOrder order_;
-  double now_ = 0.0;
+  double now_ = 0.0, finished_ = 0.0;
 };
 
 // A worker's part of the bed, small as it is, should be more than its border.
