@@ -232,7 +232,7 @@ TEST(TaskOrder, WorkersHavePartsOfTheBed) {
   }
 }
 
-// Two caches of one size hold together what one of twice the size does, if both work side by side.
+// Two workers with a cache each need together no more from memory than one worker with one of them: the border costs nothing.
 TEST(TaskOrder, PartsNeedNoMoreFromMemory) {
   Simulation sim = long_bed(64);
   sim.ensure_forces();
@@ -244,7 +244,7 @@ TEST(TaskOrder, PartsNeedNoMoreFromMemory) {
     return bytes_from_memory(table, sim.batches(), cache);
   };
   EXPECT_LT(brought(2, all / 6.0), 0.5 * bytes_from_memory(by_step, sim.batches(), all / 3.0));
-  EXPECT_LT(brought(2, all / 6.0), 1.6 * brought(1, all / 3.0));
+  EXPECT_LT(brought(2, all / 6.0), 1.05 * brought(1, all / 6.0));
 }
 
 TEST(TaskOrder, MoreWorkersThanBatches) {
