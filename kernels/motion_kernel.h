@@ -16,7 +16,6 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
   Real fastest = zero;    // speed, squared
   Real rolled = zero;
   Real strongest = zero;  // largest force on a sphere, squared
-  Real crooked = zero;    // stays 0 while spins are numbers
   for (std::int32_t k = 0; k < b.count; k += I::width) {
     typename I::Record records[I::width];
     for (int lane = 0; lane < I::width; ++lane)
@@ -64,7 +63,6 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
       }
     }
 
-    if constexpr (guarded) crooked = I::fma(zero, u.x + u.y + u.z, crooked);
 
     Vec3<I> x = {I::load(b.x + k), I::load(b.y + k), I::load(b.z + k)};
     x = add_scaled<I>(x, drift, v);
@@ -94,10 +92,7 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
     fastest = I::max(fastest, speed2);
   }
   totals.fastest2 = I::largest(fastest);
-  if constexpr (guarded) {
-    totals.strongest = I::largest(strongest);
-    totals.out_of_range = totals.out_of_range || !(I::sum(crooked) == 0.0);
-  }
+  if constexpr (guarded) totals.strongest = I::largest(strongest);
   if constexpr (energy && rolling) {
     const double total = I::sum(rolled);
     // Beyond this bound the sum is not exact.
