@@ -49,7 +49,7 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
     u = add_scaled<I>(u, turn, Vec3<I>{f[4], f[5], f[6]});
     if constexpr (rolling) {
       const Real strength = I::set(c.mu_r) * f[3] + f[7];
-      // Where nothing brakes no spin is changed by a bit; a root and a division are a quarter of a sphere's motion.
+      // Where nothing brakes no spin is changed by a bit, and a root and a division are spared.
       if (I::any(I::negate(zero >= strength))) {
         const Vec3<I> slowed = slowed_spin<I>(u, strength * turn);
         if constexpr (energy) {

@@ -46,6 +46,14 @@ int loaded(const TaskTable& table, std::size_t places) {
   return count;
 }
 
+using Key = std::tuple<int, int, int>;
+Key key(const Task& task) { return {static_cast<int>(task.kind), task.batch, task.offset}; }
+std::map<Key, std::size_t> index_of_tasks(const TaskTable& table) {
+  std::map<Key, std::size_t> index;
+  for (std::size_t t = 0; t < table.tasks().size(); ++t) index[key(table.tasks()[t])] = t;
+  return index;
+}
+
 TaskTable ordered(const Simulation& sim, int steps, bool fused, double cache) {
   TaskTable table(sim.batches(), steps, fused);
   table.reorder(order_for_cache(table, sim.batches(), cache));
@@ -164,8 +172,6 @@ TEST(TaskOrder, AGraphRunsEveryTaskOnceAndInOrder) {
   Simulation sim = long_bed(64);
   sim.ensure_forces();
   const TaskTable table = ordered(sim, 6, false, touched_bytes(sim.batches()) / 4.0);
-  using Key = std::tuple<int, int, int>;
-  const auto key = [](const Task& task) { return Key(static_cast<int>(task.kind), task.batch, task.offset); };
   for (const int steps : {1, 4, 6})
     for (const int threads : {0, 1, 2, 3}) {
       std::mutex mutex;
@@ -266,9 +272,7 @@ TEST(TaskOrder, AThreadStaysWithItsWorker) {
   sim.ensure_forces();
   for (const bool fused : {false, true}) {
     const TaskTable table = parted(sim, 6, fused, 3);
-    std::map<std::tuple<int, int, int>, std::size_t> index;
-    const auto key = [](const Task& task) { return std::tuple(static_cast<int>(task.kind), task.batch, task.offset); };
-    for (std::size_t t = 0; t < table.tasks().size(); ++t) index[key(table.tasks()[t])] = t;
+    const auto index = index_of_tasks(table);
     std::vector<std::size_t> done;
     tbb::task_arena one(1);
     one.execute([&] {
@@ -297,9 +301,7 @@ TEST(TaskOrder, ManyThreadsTakeThePartsInOrder) {
   Simulation sim = long_bed(64);
   sim.ensure_forces();
   const TaskTable table = parted(sim, 6, false, 3);
-  std::map<std::tuple<int, int, int>, std::size_t> index;
-  const auto key = [](const Task& task) { return std::tuple(static_cast<int>(task.kind), task.batch, task.offset); };
-  for (std::size_t t = 0; t < table.tasks().size(); ++t) index[key(table.tasks()[t])] = t;
+  const auto index = index_of_tasks(table);
   for (const int steps : {1, 4, 6})
     for (int repetition = 0; repetition < 20; ++repetition) {
       std::mutex mutex;
