@@ -6,7 +6,7 @@
 //   sums        [ own particles | halo slots | spare ]   halo slot: one per foreign partner, written by this batch only,
 //                                                         read by the partner's batch through `incoming`
 //
-// A pair across two batches belongs to the batch of the lower colour; neighbouring batches never share a colour.
+// A pair across two batches belongs to one of them [core/neighbours.h, Ownership].
 #pragma once
 
 #include <cstdint>
@@ -34,7 +34,8 @@ struct Incoming {
 
 struct Batch {
   std::int32_t first = 0, count = 0;
-  int colour = 0;
+  int colour = 0;                     // where it decides who owns a pair
+  double centre[3] = {0, 0, 0};       // of its spheres when the lists were made [m]
 
   PooledVector<std::int32_t> outer_i, outer_j;
 

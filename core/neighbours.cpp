@@ -146,6 +146,21 @@ void colour(std::vector<Batch>& batches) {
   }
 }
 
+void find_centre(Batch& batch, const Particles& p) {
+  const AlignedArray<double>* columns[3] = {&p.x, &p.y, &p.z};
+  const std::int32_t end = std::min(batch.first + batch.count, p.count);
+  for (int axis = 0; axis < 3; ++axis) {
+    double sum = 0.0;
+    for (std::int32_t k = batch.first; k < end; ++k) sum += (*columns[axis])[static_cast<std::size_t>(k)];
+    batch.centre[axis] = sum / std::max(end - batch.first, 1);
+  }
+}
+
+// Whether j is reached from i by the shorter way forwards along the curve, whose end is followed by its beginning.
+bool lies_ahead(std::int32_t i, std::int32_t j, std::int32_t all) {
+  return i < j ? 2 * std::int64_t{j - i} <= all : 2 * std::int64_t{i - j} > all;
+}
+
 }  // namespace
 
 int automatic_batch(std::int32_t particles, int threads, bool even) {
@@ -184,7 +199,7 @@ int BatchOf::operator()(std::int32_t particle) const {
   return static_cast<int>(std::upper_bound(starts.begin(), starts.end(), particle) - starts.begin()) - 1;
 }
 
-std::vector<Batch> make_batches(const Particles& p, const Domain& domain, const Margins& margins, int size,
+std::vector<Batch> make_batches(const Particles& p, const Domain& domain, const Margins& margins, int size, Ownership ownership,
                                 const KernelTable& kernels, const ParallelFor& parallel) {
   const int vectors = p.padded / padding;
   const int count = std::max(1, std::min(vectors, static_cast<int>(std::lround(static_cast<double>(p.padded) / size))));
@@ -205,6 +220,7 @@ std::vector<Batch> make_batches(const Particles& p, const Domain& domain, const 
   // Every pair within a batch once, every pair across batches from both sides; then the owner keeps it.
   parallel(count, [&](int k) {
     Batch& batch = batches[static_cast<std::size_t>(k)];
+    find_centre(batch, p);
     std::vector<char> seen(static_cast<std::size_t>(count), 0);
     std::vector<std::int32_t> close;  // partners of one particle; grows to the most candidates that one had
     PooledVector<std::int32_t> to_i, to_j;
@@ -225,30 +241,29 @@ std::vector<Batch> make_batches(const Particles& p, const Domain& domain, const 
     for (int other = 0; other < count; ++other)
       if (other != k && seen[static_cast<std::size_t>(other)]) batch.partners.push_back(other);
   });
-  colour(batches);
+  if (ownership == Ownership::by_colour) colour(batches);
   parallel(count, [&](int k) {
     Batch& batch = batches[static_cast<std::size_t>(k)];
+    const auto owns = [&](std::int32_t i, std::int32_t j, int other) {
+      return ownership == Ownership::ahead ? lies_ahead(i, j, p.padded) : batch.colour < batches[static_cast<std::size_t>(other)].colour;
+    };
+    std::vector<char> shares(static_cast<std::size_t>(count), 0);
     std::size_t kept = 0;
     for (std::size_t m = 0; m < batch.outer_j.size(); ++m) {
-      const std::int32_t j = batch.outer_j[m];
-      const bool own = j >= batch.first && j < batch.first + batch.count;
-      if (!own && batches[static_cast<std::size_t>(batch_of[static_cast<std::size_t>(j / padding)])].colour < batch.colour) continue;
-      batch.outer_i[kept] = batch.outer_i[m];
+      const std::int32_t i = batch.outer_i[m], j = batch.outer_j[m];
+      if (j < batch.first || j >= batch.first + batch.count) {
+        const int other = batch_of[static_cast<std::size_t>(j / padding)];
+        if (!owns(i, j, other)) continue;
+        shares[static_cast<std::size_t>(other)] = 1;
+      }
+      batch.outer_i[kept] = i;
       batch.outer_j[kept++] = j;
     }
     batch.outer_i.resize(kept), batch.outer_j.resize(kept);
+    std::erase_if(batch.partners, [&](int other) { return !shares[static_cast<std::size_t>(other)]; });
   });
-  for (int k = 0; k < count; ++k) {
-    Batch& batch = batches[static_cast<std::size_t>(k)];
-    const auto mine = batch.partners;
-    batch.partners.clear();
-    for (int other : mine) {
-      if (batches[static_cast<std::size_t>(other)].colour > batch.colour) {
-        batch.partners.push_back(other);
-        batches[static_cast<std::size_t>(other)].owners.push_back(k);
-      }
-    }
-  }
+  for (int k = 0; k < count; ++k)
+    for (const int other : batches[static_cast<std::size_t>(k)].partners) batches[static_cast<std::size_t>(other)].owners.push_back(k);
   return batches;
 }
 

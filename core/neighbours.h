@@ -15,6 +15,9 @@ namespace platen {
 
 // Calls body(k) for k = 0 .. count-1, in any order, on any thread.
 using ParallelFor = std::function<void(int count, const std::function<void(int)>& body)>;
+inline void in_turn(int count, const std::function<void(int)>& body) {
+  for (int k = 0; k < count; ++k) body(k);
+}
 
 struct Domain {
   double width = 0.0, depth = 0.0;  // periodic lengths [m]; 0 where not periodic
@@ -38,9 +41,15 @@ inline double distance2(const double* a, const double* b, const Domain& domain) 
   return dx * dx + dy * dy + dz * dz;
 }
 
+// Whose a pair across two batches is.
+enum class Ownership {
+  ahead,     // of the one that meets the other ahead on the curve, taken as a ring: half of a batch's border is its own
+  by_colour  // of the one of the lower colour, which neighbouring batches never share: no two wait for each other [step_graph.h]
+};
+
 // Cuts the particles into batches of about `size` and fills their outer lists with every pair closer than
 // R_i + R_j + both margins. Particles must be in Morton order, rows up to date.
-std::vector<Batch> make_batches(const Particles& particles, const Domain& domain, const Margins& margins, int size,
+std::vector<Batch> make_batches(const Particles& particles, const Domain& domain, const Margins& margins, int size, Ownership ownership,
                                 const KernelTable& kernels, const ParallelFor& parallel);
 
 // About as many particles, with their contacts, as the third cache of common processors holds.

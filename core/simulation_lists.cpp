@@ -342,7 +342,8 @@ void Simulation::rebuild_from(const PairHistories& pairs, const std::vector<Plat
   batches_.clear();  // before the new ones are made: their memory serves again
   // Places of sums are counted in bytes and two more bits [kernels/owner_runs.h]: no batch may have more than some millions.
   const int size = std::min(engine_.batch > 0 ? engine_.batch : automatic_batch(particles_.count, engine_.threads, even), 1 << 21);
-  batches_ = make_batches(particles_, domain_, outer_, size, kernels_, run);
+  const Ownership ownership = engine_.fused ? Ownership::by_colour : Ownership::ahead;
+  batches_ = make_batches(particles_, domain_, outer_, size, ownership, kernels_, run);
   fill_inner(batches_, particles_, domain_, inner_, keeps_k_t(), pairs, run);
   list_plates(batches_, particles_, planes_, step_, inner_, plate_gap_, plates, run);
   merged_.assign(batches_.size(), 1);

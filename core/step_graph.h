@@ -41,6 +41,7 @@ enum Resource { resource_state, resource_sums, resource_halo, resource_history, 
 struct TaskOrder {
   std::vector<std::int32_t> tasks;   // tasks[k]: the task that comes k-th
   std::vector<std::int32_t> worker;  // who takes it; empty: whoever is free
+  double time = 0.0;                 // of all, by the forecast of who finds an order [times of a contact]
 };
 
 class TaskTable {

@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/neighbours.h"
 #include "core/step_graph.h"
 
 namespace platen {
@@ -32,16 +33,18 @@ double bytes_from_memory(const TaskTable& table, const std::vector<Batch>& batch
 // An order of the table's tasks that keeps all edges. Greedy: of the batches that may go on
 // the one with the lowest price, which rises with what it needs from memory in a cache of so many bytes, falls with the share of
 // its neighbours that the cache holds, since those let each other go on, and rises a little with how far ahead it is.
-// Takes about twice (tasks) x (batches in the cache and around it) operations, and one look at all batches for each group far from the others.
+// Takes about two to four times (tasks) x (batches in the cache and around it) operations, and one look at all batches for each group
+// far from the others.
 //
-// Several workers have a part of the bed each, of equally many bytes along the curve, and a cache of their own: cores do
+// Several workers have a part of the bed each, of equally many bytes, and a cache of their own: cores do
 // not always share one. Each has its own sequence of tasks; one waits for another's only at the border of their parts, and who
-// would have to wait how long is foreseen by the time that tasks should take. With one worker tasks are anybody's.
-TaskOrder order_for_cache(const TaskTable& table, const std::vector<Batch>& batches, double bytes, int workers = 1);
+// would have to wait how long is foreseen by the time that tasks should take. By the same forecast the parts are chosen: slabs across an
+// axis, or stretches of the curve. With one worker tasks are anybody's.
+TaskOrder order_for_cache(const TaskTable& table, const std::vector<Batch>& batches, double bytes, int workers = 1, const ParallelFor& parallel = in_turn);
 
 // Puts the tasks into such an order where the batches have more than twice the bytes; not where they are so small that hundreds
 // fit in, for which nobody asks but a case file's `batch`: the search would take longer than it saves. Workers with too few batches to have
 // a part of their own take what comes next; of more than two each counts on less than `bytes`.
-void order_if_large(TaskTable& table, const std::vector<Batch>& batches, double bytes, int workers);
+void order_if_large(TaskTable& table, const std::vector<Batch>& batches, double bytes, int workers, const ParallelFor& parallel = in_turn);
 
 }  // namespace platen

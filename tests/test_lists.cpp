@@ -249,6 +249,39 @@ TEST(Lists, PaddingDoesNotMove) {
   EXPECT_LE(sim.counters().redone_steps, 32);  // the first steps, before the common velocity is known
 }
 
+// What lies between two halves of a periodic bed is listed once: half of it with each where pairs belong to who has them ahead, all with one by colour.
+TEST(Batches, ShareWhatLiesBetweenThem) {
+  for (const bool fused : {false, true}) {
+    BedOptions bed;
+    bed.nx = 16, bed.ny = 6, bed.nz = 6;
+    EngineOptions engine;
+    engine.batch = bed.nx * bed.ny * bed.nz / 2, engine.fused = fused;
+    Simulation sim(scenes::bed(bed, scenes::full_law(), engine));
+    sim.ensure_forces();
+    ASSERT_EQ(sim.batches().size(), 2u);
+    std::set<std::pair<std::int32_t, std::int32_t>> across;
+    int owned[2] = {0, 0}, listed = 0;
+    for (std::size_t k = 0; k < 2; ++k) {
+      const Batch& b = sim.batches()[k];
+      for (std::size_t m = 0; m < b.outer_j.size(); ++m) {
+        const std::int32_t i = b.outer_i[m], j = b.outer_j[m];
+        if (j >= b.first && j < b.first + b.count) continue;
+        across.insert({std::min(i, j), std::max(i, j)});
+        ++owned[k], ++listed;
+      }
+      EXPECT_EQ(b.partners.size(), owned[k] > 0 ? 1u : 0u);
+      EXPECT_EQ(sim.batches()[1 - k].owners.size(), b.partners.size());
+    }
+    EXPECT_GT(listed, 0);
+    EXPECT_EQ(across.size(), static_cast<std::size_t>(listed));
+    if (fused) {
+      EXPECT_TRUE(owned[0] == 0 || owned[1] == 0);
+    } else {
+      EXPECT_GT(std::min(owned[0], owned[1]), 0.4 * listed);
+    }
+  }
+}
+
 // Batches of `spheres` each with the given numbers of pairs.
 std::vector<Batch> batches_with(std::int32_t spheres, std::initializer_list<std::int32_t> pairs) {
   std::vector<Batch> batches;

@@ -79,18 +79,17 @@ std::size_t unordered(const TaskTable& table, const std::vector<std::pair<std::s
 
 template <class Body>
 void for_each_table(int steps, const Body& body) {
-  for (const Shape& shape : shapes()) {
-    EngineOptions engine;
-    engine.batch = shape.batch;
-    Simulation sim(scenes::bed(shape.bed, scenes::full_law(), engine));
-    sim.set_time_step(1e-5);
-    scenes::add_plates(sim, scenes::height_of(shape.bed), 0.0);
-    sim.ensure_forces();
+  for (const Shape& shape : shapes())
     for (const bool fused : {false, true}) {
       SCOPED_TRACE(std::string(shape.name) + (fused ? ", fused" : ", split"));
+      EngineOptions engine;
+      engine.batch = shape.batch, engine.fused = fused;
+      Simulation sim(scenes::bed(shape.bed, scenes::full_law(), engine));
+      sim.set_time_step(1e-5);
+      scenes::add_plates(sim, scenes::height_of(shape.bed), 0.0);
+      sim.ensure_forces();
       body(sim, TaskTable(sim.batches(), steps, fused));
     }
-  }
 }
 
 TEST(TaskGraph, ConflictsAreOrdered) {
@@ -123,13 +122,13 @@ TEST(TaskGraph, EdgesGoForwardAndOnce) {  // a doubled edge would make a flow gr
 }
 
 TEST(TaskGraph, AMissingEdgeIsSeen) {
-  EngineOptions engine;
-  engine.batch = 16;
   BedOptions bed;
   bed.nx = bed.ny = 4, bed.nz = 5;
-  Simulation sim(scenes::bed(bed, scenes::full_law(), engine));
-  sim.ensure_forces();
   for (const bool fused : {false, true}) {
+    EngineOptions engine;
+    engine.batch = 16, engine.fused = fused;
+    Simulation sim(scenes::bed(bed, scenes::full_law(), engine));
+    sim.ensure_forces();
     const TaskTable whole(sim.batches(), 2, fused);
     const auto pairs = conflicts(whole);
     int edges = 0, seen = 0;
