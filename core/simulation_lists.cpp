@@ -331,20 +331,32 @@ void Simulation::rebuild_with(const PairHistories& pairs) {
   rebuild_from(pairs, plate_history(batches_, particles_), had_forces ? &sums : nullptr);
 }
 
+// Particles in a batch. `even`: equal stretches of the curve are equal work.
+int Simulation::batch_size(bool even) const {
+  // Places of sums are counted in bytes and two more bits [kernels/owner_runs.h]: no batch may have more than some millions.
+  return std::min(engine_.batch > 0 ? engine_.batch : automatic_batch(particles_.count, engine_.threads, even), 1 << 21);
+}
+
+void Simulation::cut_into_batches(const PairHistories& pairs, int size) {
+  const auto run = [this](int count, const std::function<void(int)>& body) { parallel(count, body); };
+  batches_.clear();  // before the new ones are made: their memory serves again
+  const Ownership ownership = engine_.fused ? Ownership::by_colour : Ownership::ahead;
+  batches_ = make_batches(particles_, domain_, outer_, size, ownership, kernels_, run);
+  fill_inner(batches_, particles_, domain_, inner_, keeps_k_t(), pairs, run);
+}
+
 // `sums`: forces by rank; null where there are none yet.
 void Simulation::rebuild_from(const PairHistories& pairs, const std::vector<PlateHistory>& plates, const AlignedArray<double>* sums) {
   const auto run = [this](int count, const std::function<void(int)>& body) { parallel(count, body); };
-  const bool even = engine_.threads == 2 && work_is_even(batches_, engine_.threads);
+  const bool known = !batches_.empty();
+  const bool even = engine_.threads == 2 && (!known || work_is_even(batches_, engine_.threads));
   particles_.permute(morton_order(particles_));
   choose_margins(true);
   graph_.reset();
   table_.reset();
-  batches_.clear();  // before the new ones are made: their memory serves again
-  // Places of sums are counted in bytes and two more bits [kernels/owner_runs.h]: no batch may have more than some millions.
-  const int size = std::min(engine_.batch > 0 ? engine_.batch : automatic_batch(particles_.count, engine_.threads, even), 1 << 21);
-  const Ownership ownership = engine_.fused ? Ownership::by_colour : Ownership::ahead;
-  batches_ = make_batches(particles_, domain_, outer_, size, ownership, kernels_, run);
-  fill_inner(batches_, particles_, domain_, inner_, keeps_k_t(), pairs, run);
+  cut_into_batches(pairs, batch_size(even));
+  // What was taken for even at first would stay so until the next rebuild, which a bed at rest hardly ever needs.
+  if (!known && even && batch_size(false) != batch_size(true) && !work_is_even(batches_, engine_.threads)) cut_into_batches(pairs, batch_size(false));
   list_plates(batches_, particles_, planes_, step_, inner_, plate_gap_, plates, run);
   merged_.assign(batches_.size(), 1);
   if (sums != nullptr) put_sums(*sums);

@@ -307,6 +307,23 @@ TEST(AutomaticBatch, SeveralForEachThreadWhereItIsNot) {
   EXPECT_EQ(automatic_batch(35000, 4, true), 2064);
 }
 
+// From the first step on, since a bed at rest may not make its lists anew for long.
+TEST(AutomaticBatch, WhetherWorkIsEvenIsKnownAtOnce) {
+  for (const bool even : {true, false}) {
+    BedOptions bed;
+    bed.nx = 20, bed.ny = 8, bed.nz = 14;
+    SimulationSetup setup = scenes::bed(bed, scenes::full_law(), {});
+    setup.engine.threads = 2;
+    if (!even)  // spheres of one half of the bed lose sight of each other
+      for (std::size_t k = 0; k < setup.spheres.id.size(); ++k)
+        if (setup.spheres.position[3 * k] > 0.5 * setup.width) setup.spheres.position[3 * k + 2] *= 3.0;
+    Simulation sim(std::move(setup));
+    sim.ensure_forces();
+    EXPECT_EQ(sim.counters().batches, even ? 2 : 6);
+    EXPECT_EQ(sim.counters().rebuilds, 1);
+  }
+}
+
 TEST(AutomaticBatch, NoneIsTooLarge) {
   for (const int threads : {1, 2, 4, 16})
     for (const std::int32_t particles : {35'000, 280'000, 1'000'000, 5'000'000}) {
