@@ -34,7 +34,7 @@ void table_of_orders(const StepOptions& o) {
                  {"milliseconds", 1e3 * seconds}});
     }
   }
-  std::printf("By step: one cache. Ordered: one for each worker.\n");
+  std::printf("By step: one cache. Ordered: one for each worker. ms: all searches one after the other.\n");
   write_json(o.json, "orders", table);
 }
 

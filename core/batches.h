@@ -34,7 +34,7 @@ struct Incoming {
 
 struct Batch {
   std::int32_t first = 0, count = 0;
-  int colour = 0;                     // where it decides who owns a pair
+  int colour = 0;                     // 0 for all unless it decides who owns a pair
   double centre[3] = {0, 0, 0};       // of its spheres when the lists were made [m]
 
   PooledVector<std::int32_t> outer_i, outer_j;

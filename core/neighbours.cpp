@@ -156,7 +156,8 @@ void find_centre(Batch& batch, const Particles& p) {
   }
 }
 
-// Whether j is reached from i by the shorter way forwards along the curve, whose end is followed by its beginning.
+// Whether the shorter way from i to j along the curve, closed to a ring, goes forwards; of two equally long ones that from the lower
+// number. True of exactly one of (i, j) and (j, i).
 bool lies_ahead(std::int32_t i, std::int32_t j, std::int32_t all) {
   return i < j ? 2 * std::int64_t{j - i} <= all : 2 * std::int64_t{i - j} > all;
 }
@@ -164,9 +165,9 @@ bool lies_ahead(std::int32_t i, std::int32_t j, std::int32_t all) {
 }  // namespace
 
 int automatic_batch(std::int32_t particles, int threads, bool even) {
-  // Fewer and larger batches have fewer pairs across and cost the graph less. Where work lies unevenly, or the colours of
-  // many batches make it uneven, about three to eight for each thread even the load out, eight from 2,048 spheres each on,
-  // where a task is long against what the graph takes for it. None has more than 20,000: larger ones were
+  // Fewer and larger batches have fewer pairs across and cost the graph less. Where work lies unevenly, and on more
+  // than two threads, where one for each was never measured, about three to eight for each thread even the load out, eight from 2,048
+  // spheres each on, where a task is long against what the graph takes for it. None has more than 20,000: larger ones were
   // no faster. Beds that no cache holds are run batch by batch in an order of their own, which needs small ones
   // [core/task_order.h, docs/decisions.md].
   threads = std::max(1, threads);

@@ -43,8 +43,8 @@ inline double distance2(const double* a, const double* b, const Domain& domain) 
 
 // Whose a pair across two batches is.
 enum class Ownership {
-  ahead,     // of the one that meets the other ahead on the curve, taken as a ring: half of a batch's border is its own
-  by_colour  // of the one of the lower colour, which neighbouring batches never share: no two wait for each other [step_graph.h]
+  ahead,     // of the one whose sphere has the other's ahead of it on the curve, taken as a ring
+  by_colour  // for fused tasks: of the one of the lower colour, so that within a step no two batches wait for each other [step_graph.cpp]
 };
 
 // Cuts the particles into batches of about `size` and fills their outer lists with every pair closer than

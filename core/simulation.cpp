@@ -389,7 +389,7 @@ void Simulation::prepare_graph() {
   graph_.reset();
   table_ = std::make_unique<TaskTable>(batches_, unroll_, engine_.fused);
   order_if_large(*table_, batches_, engine_.cache, engine_.executor == Executor::flow_graph ? engine_.threads : 1,
-                 [this](int count, const std::function<void(int)>& body) { parallel(count, body); });
+                 on_workers());
   if (engine_.tamper) engine_.tamper(*table_);
   if (engine_.executor == Executor::flow_graph)
     workers_->arena.execute([&] { graph_ = std::make_unique<FlowGraph>(*table_, [this](const Task& task) { run_task(task); }); });

@@ -190,6 +190,9 @@ class Simulation {
   void restore();
   void mean_velocity();
   void parallel(int count, const std::function<void(int)>& body);
+  ParallelFor on_workers() {
+    return [this](int count, const std::function<void(int)>& body) { parallel(count, body); };
+  }
   [[noreturn]] void fail(const std::string& what);
   void prepare_graph();
   void add_pair_energy(FixedSum& sum) const;

@@ -313,7 +313,7 @@ int Simulation::prepare_lists(std::int64_t wanted) {
 void Simulation::prune_lists() {
   merge_all();
   const auto plates = plate_history(batches_, particles_);
-  const auto run = [this](int count, const std::function<void(int)>& body) { parallel(count, body); };
+  const ParallelFor run = on_workers();
   prune(batches_, particles_, domain_, inner_, keeps_k_t(), run);
   list_plates(batches_, particles_, planes_, step_, inner_, plate_gap_, plates, run);
   remember(at_prune_, drift_at_prune_);
@@ -338,7 +338,7 @@ int Simulation::batch_size(bool even) const {
 }
 
 void Simulation::cut_into_batches(const PairHistories& pairs, int size) {
-  const auto run = [this](int count, const std::function<void(int)>& body) { parallel(count, body); };
+  const ParallelFor run = on_workers();
   batches_.clear();  // before the new ones are made: their memory serves again
   const Ownership ownership = engine_.fused ? Ownership::by_colour : Ownership::ahead;
   batches_ = make_batches(particles_, domain_, outer_, size, ownership, kernels_, run);
@@ -347,16 +347,16 @@ void Simulation::cut_into_batches(const PairHistories& pairs, int size) {
 
 // `sums`: forces by rank; null where there are none yet.
 void Simulation::rebuild_from(const PairHistories& pairs, const std::vector<PlateHistory>& plates, const AlignedArray<double>* sums) {
-  const auto run = [this](int count, const std::function<void(int)>& body) { parallel(count, body); };
-  const bool known = !batches_.empty();
-  const bool even = engine_.threads == 2 && (!known || work_is_even(batches_, engine_.threads));
+  const ParallelFor run = on_workers();
+  // Fused, two batches would take turns.
+  const bool even = engine_.threads == 2 && !engine_.fused && (batches_.empty() || work_is_even(batches_, engine_.threads));
   particles_.permute(morton_order(particles_));
   choose_margins(true);
   graph_.reset();
   table_.reset();
   cut_into_batches(pairs, batch_size(even));
-  // What was taken for even at first would stay so until the next rebuild, which a bed at rest hardly ever needs.
-  if (!known && even && batch_size(false) != batch_size(true) && !work_is_even(batches_, engine_.threads)) cut_into_batches(pairs, batch_size(false));
+  // Nobody knew at first, and of two batches one may have the border to itself.
+  if (even && batch_size(false) != batch_size(true) && !work_is_even(batches_, engine_.threads)) cut_into_batches(pairs, batch_size(false));
   list_plates(batches_, particles_, planes_, step_, inner_, plate_gap_, plates, run);
   merged_.assign(batches_.size(), 1);
   if (sums != nullptr) put_sums(*sums);

@@ -3,6 +3,7 @@
 #include <tbb/flow_graph.h>
 
 #include <algorithm>
+#include <stdexcept>
 #include <thread>
 
 namespace platen {
@@ -42,10 +43,14 @@ TaskTable::TaskTable(const std::vector<Batch>& batches, int steps, bool fused) :
   // Fused, a batch's contacts need the positions of its partners, which have higher colours: those go first.
   std::vector<int> order(batches.size());
   for (int b = 0; b < count; ++b) order[static_cast<std::size_t>(b)] = b;
-  if (fused)
+  if (fused) {
+    for (const Batch& batch : batches)
+      for (const int partner : batch.partners)
+        if (batches[static_cast<std::size_t>(partner)].colour <= batch.colour) throw std::logic_error("fused tasks of batches whose lists are not by colour");
     std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
       return batches[static_cast<std::size_t>(a)].colour > batches[static_cast<std::size_t>(b)].colour;
     });
+  }
   for (int offset = 0; offset < steps; ++offset) {
     if (fused) {
       for (int b : order) tasks_.push_back({TaskKind::step, b, offset});

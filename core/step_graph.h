@@ -41,11 +41,12 @@ enum Resource { resource_state, resource_sums, resource_halo, resource_history, 
 struct TaskOrder {
   std::vector<std::int32_t> tasks;   // tasks[k]: the task that comes k-th
   std::vector<std::int32_t> worker;  // who takes it; empty: whoever is free
-  double time = 0.0;                 // of all, by the forecast of who finds an order [times of a contact]
+  double time = 0.0;                 // when the last one ends, as the search foresees it [times of a contact]
 };
 
 class TaskTable {
  public:
+  // `fused` needs batches with lists by colour [core/neighbours.h, Ownership]; std::logic_error otherwise.
   TaskTable(const std::vector<Batch>& batches, int steps, bool fused);
 
   int steps() const { return steps_; }

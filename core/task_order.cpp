@@ -277,18 +277,15 @@ double bytes_from_memory(const TaskTable& table, const std::vector<Batch>& batch
 
 TaskOrder order_for_cache(const TaskTable& table, const std::vector<Batch>& batches, double bytes, int workers, const ParallelFor& parallel) {
   // No weight of how far a batch is ahead suits every bed; these two differ by up to 6 %. Nor does a cut: one leaves workers a short border,
-  // another lets more steps of what a cache holds follow each other.
+  // another lets a worker's cache take more steps of its batches one after the other.
   struct Try {
     Cut cut;
     double phase_weighs;
     TaskOrder order = {};
   };
-  std::vector<Try> tries = {{Cut::of_curve, 0.04}};
-  if (workers == 1) {
-    tries.push_back({Cut::of_curve, 0.08});
-  } else {
+  std::vector<Try> tries = {{Cut::of_curve, 0.04}, {Cut::of_curve, 0.08}};
+  if (workers > 1)
     for (const Cut cut : {Cut::across_x, Cut::across_y, Cut::across_z}) tries.push_back({cut, 0.04});
-  }
   parallel(static_cast<int>(tries.size()), [&](int k) {
     Try& t = tries[static_cast<std::size_t>(k)];
     t.order = Planner(table, batches, bytes, workers, t.cut, t.phase_weighs).plan();

@@ -143,6 +143,19 @@ TEST(TaskGraph, AMissingEdgeIsSeen) {
   }
 }
 
+// Fused, two batches that own pairs of each other would read positions of two different steps.
+TEST(TaskGraph, FusedTasksNeedListsByColour) {
+  BedOptions bed;
+  bed.nx = 8, bed.ny = 4, bed.nz = 2;
+  EngineOptions engine;
+  engine.batch = 32;
+  Simulation sim(scenes::bed(bed, scenes::full_law(), engine));
+  sim.ensure_forces();
+  ASSERT_EQ(sim.batches().size(), 2u);
+  EXPECT_NO_THROW(TaskTable(sim.batches(), 2, false));
+  EXPECT_THROW(TaskTable(sim.batches(), 2, true), std::logic_error);
+}
+
 // What the lists of the batches touch is what the tasks declare.
 TEST(TaskGraph, AccessesAreThoseOfTheLists) {
   for_each_table(1, [](const Simulation& sim, const TaskTable& table) {
