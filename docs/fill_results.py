@@ -7,12 +7,15 @@ Between `<!-- KIND WHAT -->` and `<!-- end -->` everything is written anew from 
 them has is left as it is. Kinds:
 
     figure N        the study's image, copied to docs/results/, and the statements on that figure
-    image NAME      an image alone
+    image NAME      an image alone; STUDY/NAME where several studies have it
     statements WHAT the statements of a figure column: filling, S2, ...; STUDY/WHAT where several studies have it
-    scan POWER      the best of the tried powers and the minimum, by observable: stiffness, adhesion
-    collapse        collapse errors of all curves
-    runs            steps, time steps, ledger and wall time of every run, times of every seed
-    total           how many statements hold
+    scan POWER      the best of the tried powers and the minimum, by observable: stiffness, adhesion; STUDY/POWER for that study's folder
+    scalars STUDY   strain, porosity and strength of every curve
+    collapse STUDY  collapse errors of all curves
+    runs STUDY      steps, time steps, ledger and wall time of every run, times of every seed
+    total STUDY     how many statements hold
+
+STUDY is the name of a folder here.
 """
 import csv
 import json
@@ -36,7 +39,7 @@ def markdown(header, rows):
 
 
 def shown(verdict):
-    return verdict if verdict == "holds" else f"**{verdict}**"
+    return f"**{verdict}**" if verdict == "does not hold" else verdict
 
 
 class Study:
@@ -54,7 +57,10 @@ class Study:
             return None
         return markdown(["statement", "number", "seeds", ""], [(s["statement"], s["number"], s["seeds"], shown(s["verdict"])) for s in rows])
 
-    def image(self, name, alt=None):
+    def image(self, what, alt=None):
+        study, _, name = what.rpartition("/")
+        if study not in ("", self.folder.name):
+            return None
         found = self.files(f"figures/{name}.svg")
         if not found:
             return None
@@ -67,7 +73,26 @@ class Study:
         image = self.image("fig" + number, f"Fig. {number}") if said else None
         return f"{image}\n\n{said}" if image else None
 
-    def scan(self, power):
+    def scalars(self, _):
+        columns = {"porosity_filled": ("porosity after the rain", 1, "{:.4f}"), "strain_peak": ("strain at 40 kPa, %", 100, "{:.2f}"),
+                   "porosity_peak": ("porosity there", 1, "{:.4f}"), "strength": ("strength, kPa", 1e-3, "{:.2f}"),
+                   "initial_stiffness": ("initial stiffness, kPa", 1e-3, "{:.0f}")}
+        rows = {}
+        for file in self.files("tables/scalars.csv"):
+            for row in table(file):
+                if row["quantity"] in columns and row["mean"]:
+                    _, scale, form = columns[row["quantity"]]
+                    spread = " ± " + form.format(scale * float(row["deviation"])) if row["deviation"] else ""
+                    found = rows.setdefault((row["curve"], f"{1e3 * float(row['radius [m]']):g}"), {"seeds": row["seeds"]})
+                    found[row["quantity"]] = form.format(scale * float(row["mean"])) + spread
+        there = [q for q in columns if any(q in found for found in rows.values())]
+        header = ["curve", "R mm", "seeds", *(columns[q][0] for q in there)]
+        return markdown(header, [(*key, found["seeds"], *(found.get(q, "-") for q in there)) for key, found in rows.items()]) if rows else None
+
+    def scan(self, what):
+        study, _, power = what.rpartition("/")
+        if study not in ("", self.folder.name):
+            return None
         rows = []
         for file in self.files("tables/scans.csv"):
             for row in table(file):
@@ -80,7 +105,7 @@ class Study:
                 rows.append((where, row["observable"], row["seeds"], errors, row["best tried"], minimum))
         return markdown(["curve", "observable", "seeds", "error over range, by power", "best tried", "minimum"], rows) if rows else None
 
-    def collapse(self):
+    def collapse(self, _):
         rows = []
         for file in self.files("tables/collapse.csv"):
             part = file.parent.parent.name if file.parent.parent != self.folder else "-"
@@ -92,7 +117,7 @@ class Study:
             return None
         return markdown(["study", "curve", "observable", "seeds", "error", "scatter", "over range", "over seed scatter"], rows)
 
-    def runs(self):
+    def runs(self, _):
         rows, spans = [], {}  # seed -> runs, seconds of one thread, first start, last end
         for run in table(self.folder / "runs.csv"):
             file = self.folder / "runs" / run["run"] / "summary.json"
@@ -115,25 +140,26 @@ class Study:
         seeds = [(seed, count, f"{seconds / 3600:.2f}", f"{minutes(last) - minutes(first):.0f}") for seed, (count, seconds, first, last) in spans.items()]
         return markdown(header, rows) + "\n\n" + markdown(["seed", "runs", "h of one thread", "min from the first start to the last end"], seeds)
 
-    def total(self):
+    def total(self, _):
         if not self.statements:
             return None
         count = lambda verdict: sum(s["verdict"] == verdict for s in self.statements)
         return f"{count('holds')} statements hold, {count('does not hold')} do not, {count('not judged')} cannot be judged from these runs."
 
     def block(self, kind, what):
-        if what:
-            return {"figure": self.figure, "image": self.image, "statements": self.said, "scan": self.scan}[kind](what)
-        return {"collapse": self.collapse, "runs": self.runs, "total": self.total}[kind]()
+        of_study = {"scalars": self.scalars, "collapse": self.collapse, "runs": self.runs, "total": self.total}
+        if kind in of_study:
+            return of_study[kind](what) if what == self.folder.name else None
+        return {"figure": self.figure, "image": self.image, "statements": self.said, "scan": self.scan}[kind](what)
 
 
 def main():
-    folders = [Path(folder) for folder in sys.argv[1:]]
+    folders = [Path(folder).resolve() for folder in sys.argv[1:]]
     if not folders or not all((folder / "runs.csv").exists() for folder in folders):
         sys.exit(__doc__)
     studies = [Study(folder) for folder in folders]
     page = DOCS / "results.md"
-    pattern = re.compile(r"(<!-- (figure|image|statements|scan|collapse|runs|total) ?([^ ]*) -->\n).*?(<!-- end -->)", re.DOTALL)
+    pattern = re.compile(r"(<!-- (figure|image|statements|scan|scalars|collapse|runs|total) (.*?) -->\n).*?(<!-- end -->)", re.DOTALL)
 
     def filled(match):
         for study in studies:
