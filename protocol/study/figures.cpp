@@ -48,15 +48,21 @@ std::string gnuplot_text(const std::string& text) {
   return out + '"';
 }
 
+// Eight colours that also the colour-blind can tell apart [Wong 2011, and a purple], then the same dashed.
+std::string linetypes() {
+  constexpr const char* colours[] = {"000000", "0072b2", "d55e00", "009e73", "cc79a7", "e69f00", "56b4e9", "7f3c8d"};
+  const int count = static_cast<int>(std::size(colours));
+  std::string text;
+  for (int k = 0; k < 2 * count; ++k) text += fmt::format("set linetype {} lc rgb \"#{}\"{}\n", k + 1, colours[k % count], k < count ? "" : " dt 2");
+  return text + fmt::format("set linetype cycle {}\n", 2 * count);
+}
+
 std::string script_head(const std::string& name, const std::string& title, const std::string& x, const std::string& y) {
   return fmt::format(
       "# gnuplot {0}.gp draws {0}.svg and {0}.png from {0}.dat\n"
       "set terminal svg size 800,560 noenhanced font \"sans,14\" background \"white\"\nset output \"{0}.svg\"\n"
-      "set title {1}\nset xlabel {2}\nset ylabel {3}\nset key outside right top\nset grid\n"
-      "set linetype 1 lc rgb \"#000000\"\nset linetype 2 lc rgb \"#0072b2\"\nset linetype 3 lc rgb \"#d55e00\"\n"
-      "set linetype 4 lc rgb \"#009e73\"\nset linetype 5 lc rgb \"#cc79a7\"\nset linetype 6 lc rgb \"#e69f00\"\n"
-      "set linetype 7 lc rgb \"#56b4e9\"\nset linetype 8 lc rgb \"#7f3c8d\"\nset linetype cycle 8\n",
-      name, gnuplot_text(title), gnuplot_text(x), gnuplot_text(y));
+      "set title {1}\nset xlabel {2}\nset ylabel {3}\nset key outside right top\nset grid\n{4}",
+      name, gnuplot_text(title), gnuplot_text(x), gnuplot_text(y), linetypes());
 }
 
 std::string script_tail(const std::string& name) {
