@@ -15,6 +15,7 @@ namespace platen {
 
 // Calls body(k) for k = 0 .. count-1, in any order, on any thread.
 using ParallelFor = std::function<void(int count, const std::function<void(int)>& body)>;
+// One after the other, on the calling thread.
 inline void in_turn(int count, const std::function<void(int)>& body) {
   for (int k = 0; k < count; ++k) body(k);
 }

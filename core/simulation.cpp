@@ -388,8 +388,7 @@ void Simulation::prepare_graph() {
   if (table_) return;
   graph_.reset();
   table_ = std::make_unique<TaskTable>(batches_, unroll_, engine_.fused);
-  order_if_large(*table_, batches_, engine_.cache, engine_.executor == Executor::flow_graph ? engine_.threads : 1,
-                 on_workers());
+  order_if_large(*table_, batches_, engine_.cache, engine_.executor == Executor::flow_graph ? engine_.threads : 1, on_workers());
   if (engine_.tamper) engine_.tamper(*table_);
   if (engine_.executor == Executor::flow_graph)
     workers_->arena.execute([&] { graph_ = std::make_unique<FlowGraph>(*table_, [this](const Task& task) { run_task(task); }); });

@@ -33,7 +33,7 @@ double bytes_from_memory(const TaskTable& table, const std::vector<Batch>& batch
 // An order of the table's tasks that keeps all edges. Greedy: of the batches that may go on
 // the one with the lowest price, which rises with what it needs from memory in a cache of so many bytes, falls with the share of
 // its neighbours that the cache holds, since those let each other go on, and rises a little with how far ahead it is.
-// Takes about two to four times (tasks) x (batches in the cache and around it) operations, and one look at all batches for each group
+// Takes about two to five times (tasks) x (batches in the cache and around it) operations, and one look at all batches for each group
 // far from the others.
 //
 // Several workers have a part of the bed each, of equally many bytes, and a cache of their own: cores do
