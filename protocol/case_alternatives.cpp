@@ -53,9 +53,9 @@ bool read_stiffness_alternative(TableReader& law, std::string_view key, const Pa
   return true;
 }
 
-bool read_f0_alternative(TableReader& law, std::string_view key, const ParticleSpec& particles, double& out, std::string& formula) {
+bool read_f0_alternative(TableReader& law, std::string_view key, const ParticleSpec& particles, double gravity, double& out, std::string& formula) {
   TableReader data = law.table(key);
-  const std::array sources{"surface_energy", "hamaker_constant", "tensile_strength"};
+  const std::array sources{"surface_energy", "hamaker_constant", "tensile_strength", "bond_number"};
   int given = 0;
   for (const char* source : sources) given += data.has(source) ? 1 : 0;
   double R = 0.0;
@@ -64,7 +64,7 @@ bool read_f0_alternative(TableReader& law, std::string_view key, const ParticleS
     law.error(
         key,
         "says not where it comes from; allowed: exactly one of surface_energy, hamaker_constant, tensile_strength, "
-        "or a number");
+        "bond_number, or a number");
     good = false;
   }
   if (data.has("surface_energy")) {
@@ -92,6 +92,15 @@ bool read_f0_alternative(TableReader& law, std::string_view key, const ParticleS
     good &= data.number("coordination_number", positive, Need::required, CN);
     if (good) out = f0_of_tensile_strength(R, sigma_t, phi, CN);
     formula = "-4 pi R^2 sigma_t / (phi CN) [Thakur2016, Eq. 20, 21]";
+  } else if (data.has("bond_number")) {
+    double Bo = 0.0;
+    good &= data.number("bond_number", positive, Need::required, Bo);
+    if (!(particles.density > 0.0) || !(gravity > 0.0)) {
+      law.error(key, "is given by a Bond number, which needs particles.density and environment.gravity; allowed: both above 0");
+      good = false;
+    }
+    if (good) out = f0_of_bond_number(R, Bo, particles.density, gravity);
+    formula = "-Bo 4/3 pi R^3 rho g [Thakur2016, Eq. 22]";
   }
   data.refuse_unknown("f0 by material data");
   return good;

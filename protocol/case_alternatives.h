@@ -15,8 +15,8 @@ bool is_table(TableReader& table, std::string_view key);
 bool read_stiffness_alternative(TableReader& law, std::string_view key, const ParticleSpec& particles, double exponent,
                                 double& out, std::string& formula);
 
-// { surface_energy, model = "dmt" | "jkr" | "plastic_jkr", flattening }, { hamaker_constant, distance } or
-// { tensile_strength, solid_fraction, coordination_number }. As above; f0 <= 0 [N].
-bool read_f0_alternative(TableReader& law, std::string_view key, const ParticleSpec& particles, double& out, std::string& formula);
+// { surface_energy, model = "dmt" | "jkr" | "plastic_jkr", flattening }, { hamaker_constant, distance },
+// { tensile_strength, solid_fraction, coordination_number } or { bond_number }; the last needs the density and gravity [m/s2]. As above; f0 <= 0 [N].
+bool read_f0_alternative(TableReader& law, std::string_view key, const ParticleSpec& particles, double gravity, double& out, std::string& formula);
 
 }  // namespace platen

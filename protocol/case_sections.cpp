@@ -59,7 +59,7 @@ bool read_sizes(TableReader& sizes, SizeDistribution& out) {
   return good;
 }
 
-void read_law(TableReader& law, ParticleSpec& particles) {
+void read_law(TableReader& law, ParticleSpec& particles, double gravity) {
   PairLaw& out = particles.law;
   // With another exponent the stiffnesses are N/m^n, for which there are no unit names. A bad exponent stays 1 here.
   law.number("exponent", positive, Need::optional, out.exponent);
@@ -82,7 +82,7 @@ void read_law(TableReader& law, ParticleSpec& particles) {
   }
   if (is_table(law, "f0")) {
     std::string formula;
-    if (read_f0_alternative(law, "f0", particles, out.f0, formula)) particles.law_origins.emplace_back("f0", formula);
+    if (read_f0_alternative(law, "f0", particles, gravity, out.f0, formula)) particles.law_origins.emplace_back("f0", formula);
   } else {
     law.quantity("f0", Quantity::force, not_positive, Need::optional, out.f0);
   }
@@ -100,7 +100,7 @@ void read_law(TableReader& law, ParticleSpec& particles) {
   law.refuse_unknown("particles.law");
 }
 
-void read_particles(TableReader& particles, ParticleSpec& out, CaseFacts& facts) {
+void read_particles(TableReader& particles, ParticleSpec& out, double gravity, CaseFacts& facts) {
   const bool run = facts.use != CaseUse::law_only;
   facts.particles = particles.where("");
   facts.has_file = particles.has("file");
@@ -141,7 +141,7 @@ void read_particles(TableReader& particles, ParticleSpec& out, CaseFacts& facts)
   particles.quantity("density", Quantity::density, positive, need, out.density);
   particles.integer("count", 1, 1'000'000'000, need, out.count);
   TableReader law = particles.table("law", Need::required);
-  read_law(law, out);
+  read_law(law, out, gravity);
   particles.refuse_unknown("particles");
 }
 
@@ -221,18 +221,18 @@ void read_sections(TableReader& root, Case& c, CaseFacts& facts, Problems& probl
   c.seed = static_cast<std::uint64_t>(seed);
   about.refuse_unknown("case");
 
-  TableReader particles = root.table("particles", Need::required);
-  read_particles(particles, c.particles, facts);
-  TableReader plates = root.table("plates");
-  read_plates(plates, c.plates, facts);
-  TableReader box = root.table("box");
-  read_box(box, c.box, facts);
-
   TableReader environment = root.table("environment");
   facts.gravity_good =
       environment.quantity("gravity", Quantity::acceleration, not_negative, Need::optional, c.gravity) ||
       !environment.has("gravity");
   environment.refuse_unknown("environment");
+
+  TableReader particles = root.table("particles", Need::required);
+  read_particles(particles, c.particles, c.gravity, facts);
+  TableReader plates = root.table("plates");
+  read_plates(plates, c.plates, facts);
+  TableReader box = root.table("box");
+  read_box(box, c.box, facts);
 
   TableReader time = root.table("time");
   time.quantity_or("step", Quantity::time, positive, "auto", c.time.step);

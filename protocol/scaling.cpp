@@ -148,4 +148,8 @@ double bond_number(double f0, double radius, double density, double gravity) {
   return std::abs(f0) / (4.0 / 3.0 * pi * radius * radius * radius * density * gravity);
 }
 
+double f0_of_bond_number(double radius, double bond_number, double density, double gravity) {
+  return -bond_number * (4.0 / 3.0 * pi * radius * radius * radius * density * gravity);
+}
+
 }  // namespace platen

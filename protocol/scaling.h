@@ -78,4 +78,7 @@ double f0_of_tensile_strength(double radius, double tensile_strength, double sol
 // |f0| over the weight of a sphere, f_g = 4/3 pi R^3 rho g [Thakur2016, Eq. 22]: constant for f0 ~ R^3. [-]
 double bond_number(double f0, double radius, double density, double gravity);
 
+// The other way round: f0 = -Bo 4/3 pi R^3 rho g [Thakur2016, Eq. 22]. [N]
+double f0_of_bond_number(double radius, double bond_number, double density, double gravity);
+
 }  // namespace platen

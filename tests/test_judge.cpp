@@ -117,6 +117,57 @@ TEST(Judge, TakesAnUnscaledBedWithKeysOfItsOwnWhereThereIsNoPlainOne) {
   EXPECT_EQ(holds(false, false, 1.5), std::nullopt) << "none at all";
 }
 
+// What changes of a bed of half the plate speed, with three seeds each: by how much, with its standard error, against the scatter.
+TEST(Judge, ChangesStandBesideTheirOwnErrorAndTheScatter) {
+  Study study;
+  PlannedPart planned;
+  planned.study = &study, planned.reference_radius = 2e-3;
+  StudyPlan plan;
+  PartResults part;
+  part.plan = &planned;
+  const std::vector<std::pair<std::string, double>> beds{{"as published", 0.01}, {"half the plate speed", 0.005}};
+  for (const auto& [name, speed] : beds) {
+    CurveSpec spec;
+    spec.name = name;
+    if (speed < 0.01) spec.set = {"stage.compress.speed=0.005"};
+    study.curves.push_back(spec);
+    PlannedCurve curve;
+    curve.label = curve.block = name, curve.radius = 2e-3, curve.jobs = {plan.jobs.size()};
+    planned.curves.push_back(curve);
+    Job job;
+    job.c.stages.emplace_back();
+    job.c.stages.back().kind = StageKind::compress, job.c.stages.back().speed = speed;
+    plan.jobs.push_back(job);
+  }
+  for (std::size_t k = 0; k < beds.size(); ++k) {
+    MeasuredCurve curve;
+    curve.planned = &planned.curves[k], curve.jobs = {k};
+    for (const double seed : {-1.0, 0.0, 1.0}) {
+      RunMeasures run;
+      run.scalars = {{"strain_rate", 0.04}, {"strain_peak", 0.100 + 0.003 * seed + 0.001 * static_cast<double>(k)},
+                     {"strength", 1e4 + 300.0 * seed + 900.0 * static_cast<double>(k)},
+                     {"inertial_start", 4e-4}, {"inertial_peak", 7e-5}, {"quasi_static_stress", 15e3}};
+      curve.runs.push_back(run);
+    }
+    part.curves.push_back(curve);
+  }
+  std::vector<Statement> said;
+  Judge judge(part, said);
+  judge_quasi_static(judge, plan);
+  std::map<std::string, Statement> by_text;
+  for (const Statement& s : said) by_text.emplace(s.text, s);
+  const auto expect = [&](const std::string& text, const std::string& number, bool holds) {
+    ASSERT_TRUE(by_text.contains(text)) << text;
+    EXPECT_EQ(by_text.at(text).number, number);
+    EXPECT_EQ(by_text.at(text).holds, holds);
+  };
+  expect("as published: inertial number below 1e-4 at the end of loading", "7e-05 (0.0004 at the start), below 1e-4 from 15.00 kPa on", true);
+  // Standard errors of two means of three with deviations of 0.3 %, 300 Pa: times sqrt(2/3).
+  expect("half the plate speed: change of the strain at the end of loading below the scatter over seeds", "+0.1 ± 0.24 %, scatter 0.3 %", true);
+  expect("half the plate speed: change of the strength below the scatter over seeds", "+0.9 ± 0.24 kPa, scatter 0.3 kPa", false);
+  expect("half the plate speed: change of the strain at the end of loading, of it: at most 2 %", "1.00 %", true);
+}
+
 // A curve without a single run must leave what needs it open, and nothing else changed.
 TEST(Judge, WhatHasNoRunsIsNotJudged) {
   const StudyFolder study(study_text, read_file(std::string(PLATEN_SOURCE_DIR) + "/protocol/cases/quick.toml"));

@@ -181,6 +181,9 @@ TEST(Scaling, CasesByMaterialData) {
       base_case({"particles.law.f0={ tensile_strength = \"500 Pa\", solid_fraction = 0.6, coordination_number = 5 }"})
           .particles.law.f0,
       f0_of_tensile_strength(2.5e-3, 500.0, 0.6, 5.0)));
+  // Gravity counts wherever it stands in the file.
+  EXPECT_TRUE(same(base_case({"particles.law.f0={ bond_number = 300 }", "environment.gravity=\"4.905 m/s2\""}).particles.law.f0,
+                   -300.0 * 4.0 / 3.0 * pi * std::pow(2.5e-3, 3) * 2000.0 * 4.905));
   // Scaled, they are the reference's numbers times the power, not worked out anew: f0 kept here, not ~ R.
   std::vector<std::string> changes{"particles.law.f0={ surface_energy = 0.05, model = \"dmt\" }"};
   const Case reference = base_case(changes);
@@ -197,6 +200,8 @@ TEST(Scaling, WrongMaterialDataIsSaid) {
       {"particles.law.f0={ surface_energy = 0.05, model = \"jrk\" }", "nearest known word: jkr"},
       {"particles.law.f0={ surface_energy = 0.05, modle = \"jkr\" }", "nearest known key: model"},
       {"particles.law.f0={ surface_energy = 0.05, hamaker_constant = 1e-20, model = \"jkr\" }", "exactly one of"},
+      {"particles.law.f0={ bond_number = 300, model = \"jkr\" }", "model"},
+      {"particles.law.f0={ bond_number = -1 }", "bond_number"},
       {"particles.law.k1={ young_modulus = \"1 kg\" }", "particles.law.k1.young_modulus"},
       {"particles.law.k1={ young_modulus = 1e6, impact_speed = 0.3 }", "poisson_ratio: is missing"},
       {"particles.law.k1={ young_modulus = \"1 GPa\" }", "is smaller than k1"},
@@ -208,6 +213,12 @@ TEST(Scaling, WrongMaterialDataIsSaid) {
     } catch (const CaseError& error) {
       EXPECT_NE(std::string(error.what()).find(c.expected), std::string::npos) << c.change << "\n" << error.what();
     }
+  }
+  try {
+    base_case({"particles.law.f0={ bond_number = 300 }", "environment.gravity=0", "stage.fill.method=grow", "stage.fill.porosity=0.5"});
+    ADD_FAILURE() << "a Bond number without gravity";
+  } catch (const CaseError& error) {
+    EXPECT_NE(std::string(error.what()).find("needs particles.density and environment.gravity"), std::string::npos) << error.what();
   }
   EXPECT_THROW(base_case({"particles.law.exponent=1.5", "particles.law.k1={ young_modulus = 1e6 }"}), CaseError);
 }

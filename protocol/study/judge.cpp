@@ -100,11 +100,11 @@ void Judge::number(const std::string& figure, const std::string& text, Estimate 
   const std::string with_unit = unit.empty() ? "" : " " + unit;
   std::string allowed;
   if (std::isfinite(bounds.low) && std::isfinite(bounds.high))
-    allowed = fmt::format("{:g} to {:g}{}", scale * bounds.low, scale * bounds.high, with_unit);
+    allowed = fmt::format("{:.3g} to {:.3g}{}", scale * bounds.low, scale * bounds.high, with_unit);
   else if (std::isfinite(bounds.high))
-    allowed = fmt::format("at most {:g}{}", scale * bounds.high, with_unit);
+    allowed = fmt::format("at most {:.3g}{}", scale * bounds.high, with_unit);
   else
-    allowed = fmt::format("at least {:g}{}", scale * bounds.low, with_unit);
+    allowed = fmt::format("at least {:.3g}{}", scale * bounds.low, with_unit);
   const std::string error = std::isfinite(found.error) ? fmt::format(" ± {:.{}f}", scale * found.error, decimals) : "";
   say(figure, text + ": " + allowed, fmt::format("{:.{}f}{}{}", scale * value, decimals, error, with_unit),
       value >= bounds.low && value <= bounds.high);

@@ -182,6 +182,7 @@ void measure_compression(const SeriesTable& series, const Case& c, std::optional
   double quasi_static = rows.stress_top.back();
   for (std::size_t i = rows.time.size(); i-- > 0 && rows.inertial[i] < 1e-4;) quasi_static = rows.stress_top[i];
   put(out, "quasi_static_stress", rows.inertial.back() < 1e-4 ? quasi_static : nan);
+  put(out, "inertial_start", value_at(branch(rows, rows.inertial, 1.0, low), low));
   put(out, "inertial_peak", rows.inertial.back());
 
   const Curve height = branch(rows, rows.height, 1.0, zero);
@@ -201,6 +202,7 @@ void measure_compression(const SeriesTable& series, const Case& c, std::optional
   put(out, "porosity_residual", up.porosity.back());
   put(out, "coordination_unloaded", up.coordination.back());
   put(out, "stress_difference_unloaded", quasi_static_difference(up));
+  put(out, "stress_top_unloaded", up.stress_top.back());
 }
 
 void measure_crush(const SeriesTable& series, const Case& c, RunMeasures& out) {
@@ -280,9 +282,11 @@ const std::vector<ScalarKind>& scalar_kinds() {
       {"initial_stiffness", "Pa", "largest tangent below half the strength"},
       {"stress_difference", "Pa", "bottom minus top stress, mean of the compression while the inertial number is below 1e-4"},
       {"stress_difference_unloaded", "Pa", "bottom minus top stress, mean of unloading while the inertial number is below 1e-4"},
+      {"stress_top_unloaded", "Pa", "stress on the top plate at the end of unloading"},
       {"stress_bottom_released", "Pa", "stress on the bottom plate at rest without sides"},
       {"weight_over_area", "Pa", "weight of the spheres over the plate's area"},
       {"strain_rate", "1/s", "plate speed over the smallest height of the compression"},
+      {"inertial_start", "-", "inertial number when the stress first reaches 1 kPa, or the strain zero where that is lower"},
       {"inertial_peak", "-", "inertial number at the end of the compression"},
       {"quasi_static_stress", "Pa", "stress from which on the inertial number stays below 1e-4"},
       {"largest_overlap", "-",

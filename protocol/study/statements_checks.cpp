@@ -18,17 +18,19 @@ double median(std::vector<double> values) {
   return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
 }
 
-// Is a change inside the scatter over seeds of what it changes?
+// Is a change inside the scatter over seeds of what it changes? Its own standard error stands beside it.
 void inside_scatter(Judge& judge, const std::string& figure, const MeasuredCurve& curve, const MeasuredCurve& reference,
                     const std::string& scalar, const std::string& what, double scale, const std::string& unit) {
-  const double change = Judge::mean(&curve, scalar) - Judge::mean(&reference, scalar);
+  const Estimate found = Judge::minus(&curve, &reference, scalar);
+  const double change = found.value;
   const std::string text = fmt::format("{}: change of the {} below the scatter over seeds", curve.planned->label, what);
   if (!std::isfinite(change)) return;  // this case has no such stage
   const double scatter = Judge::deviation(&reference, scalar);
   if (!std::isfinite(scatter))
     return judge.say(figure, text, fmt::format("{:+.3g} {} (scatter unknown, needs two seeds)", scale * change, unit),
                      std::nullopt);
-  judge.say(figure, text, fmt::format("{:+.3g} {}, scatter {:.3g} {}", scale * change, unit, scale * scatter, unit),
+  const std::string error = std::isfinite(found.error) ? fmt::format(" ± {:.2g}", scale * found.error) : "";
+  judge.say(figure, text, fmt::format("{:+.3g}{} {}, scatter {:.3g} {}", scale * change, error, unit, scale * scatter, unit),
             std::abs(change) <= scatter);
 }
 
@@ -107,16 +109,18 @@ void judge_quasi_static(Judge& judge, const StudyPlan& plan) {
                  {.high = 0.1}, 4, "1/s");
     const double from = Judge::mean(&curve, "quasi_static_stress");
     const std::string text = curve.planned->label + ": inertial number below 1e-4 at the end of loading";
-    const double inertial = Judge::mean(&curve, "inertial_peak");
+    const double inertial = Judge::mean(&curve, "inertial_peak"), at_start = Judge::mean(&curve, "inertial_start");
     if (std::isfinite(inertial))
       judge.say("quasi-static", text,
-                fmt::format("{:.2g}, below 1e-4 {}", inertial,
+                fmt::format("{:.2g}{}, below 1e-4 {}", inertial,
+                            std::isfinite(at_start) ? fmt::format(" ({:.2g} at the start)", at_start) : "",
                             std::isfinite(from) ? fmt::format("from {:.2f} kPa on", 1e-3 * from) : "nowhere"),
                 inertial < 1e-4);
     const MeasuredCurve& reference = judge.part().curves[curve.planned->reference];
     if (&reference == &curve || judge.is_plain(curve) || reference.runs.empty()) continue;
     inside_scatter(judge, "quasi-static", curve, reference, "strain_peak", "strain at the end of loading", 100.0, "%");
     inside_scatter(judge, "quasi-static", curve, reference, "strength", "strength", 1e-3, "kPa");
+    inside_scatter(judge, "quasi-static", curve, reference, "initial_stiffness", "initial stiffness", 1e-3, "kPa");
     const double change = std::abs(Judge::mean(&curve, "strain_peak") / Judge::mean(&reference, "strain_peak") - 1.0);
     if (loading_speed(plan, curve) < loading_speed(plan, reference))
       judge.number("quasi-static", curve.planned->label + ": change of the strain at the end of loading, of it", change,
@@ -260,6 +264,8 @@ void judge_cross_checks(Judge& judge) {
     };
     check("stress_difference", "bottom minus top stress over weight/area, loading while the inertial number is below 1e-4");
     check("stress_difference_unloaded", "bottom minus top stress over weight/area, unloading while the inertial number is below 1e-4");
+    const double top = Judge::mean(&curve, "stress_top_unloaded");
+    if (std::isfinite(top)) judge.number("checks", label + ": top stress after unloading", top, {.high = 0.0}, 1, "Pa");
     check("stress_bottom_released", "bottom stress over weight/area, freed and at rest");
     const double overlap = Judge::mean(&curve, "largest_overlap");
     if (std::isfinite(overlap))

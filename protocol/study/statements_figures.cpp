@@ -223,6 +223,8 @@ void judge_figures_12_14(Judge& judge) {
                  {.low = 0.0}, 2, "%", 100.0);
     judge.number("13", size + ": largest difference of the porosity over all stresses",
                  largest_size(Judge::difference(ref, "porosity", scaled, "porosity")), {.high = 0.015}, 4);
+    judge.number("13", size + ": the same while unloading",
+                 largest_size(Judge::difference(ref, "porosity_unloading", scaled, "porosity_unloading")), {.high = 0.015}, 4);
     const double start = apart(scaled, ref, "porosity_start").value,
                  end = apart(scaled, ref, "porosity_peak").value;
     const std::string converging = size + ": the difference of the porosity shrinks with stress";
