@@ -296,9 +296,9 @@ TEST(Collapse, ScanUncertaintyCountsBothScatters) {
 
 // -------------------------------------------------------------------------------------------------------- whole studies
 
-// Every table of a study that is not about time, as one text.
+// Every table of a study that is not about time, and study.h5 byte for byte, as one text.
 std::string tables_of(const fs::path& folder) {
-  std::vector<fs::path> files{folder / "runs.csv", folder / "statements.csv", folder / "statements.md",
+  std::vector<fs::path> files{folder / "runs.csv", folder / "statements.csv", folder / "statements.md", folder / "study.h5",
                               folder / "figures/fig.dat"};
   for (const auto& entry : fs::directory_iterator(folder / "tables")) files.push_back(entry.path());
   std::sort(files.begin(), files.end());
