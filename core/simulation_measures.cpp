@@ -487,7 +487,7 @@ void Simulation::fail(const std::string& what) {
     }
     sphere(fastest, ("is the fastest, " + std::to_string(std::sqrt(most)) + " m/s").c_str());
   }
-  throw RunError(text + "; a smaller time step, softer loading or lower speeds help");
+  throw RunError(text + "; lower speeds (of plates and falling spheres), stiffer contacts or a smaller time step help");
 }
 
 }  // namespace platen

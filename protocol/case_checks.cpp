@@ -63,12 +63,12 @@ void check_box(const Case& c, const CaseFacts& facts, Problems& problems) {
     if (c.box.sides == Sides::periodic) {
       problems.add(where, key,
                    fmt::format("{:.6g} m is too narrow for a periodic box, a sphere would meet itself or one "
-                               "partner twice; allowed: >= 4 R_max + 2 skin = {:.6g} m",
-                               length, narrowest));
+                               "partner twice; allowed: >= 4 R_max + 2 skin = {:.6g} m (R_max = {:.6g} m)",
+                               length, narrowest, R_max));
     } else if (c.box.sides == Sides::walls) {
       problems.add(where, key,
-                   fmt::format("{:.6g} m is narrower than the largest sphere; allowed: >= 2 R_max = {:.6g} m", length,
-                               narrowest));
+                   fmt::format("{:.6g} m is narrower than the largest sphere; allowed: >= 2 R_max = {:.6g} m (R_max = {:.6g} m)", length,
+                               narrowest, R_max));
     }
   };
   check_length(facts.width_good, c.box.width, facts.width, "box.width");

@@ -115,6 +115,7 @@ struct StageSpec {
   double speed = 0.0;                  // compress, unload, crush [m/s] > 0
   Until until;
   double strain_zero = 0.0;            // stress at which strain starts to count [Pa]; compress 5 kPa, crush 20 Pa
+  bool own_strain_zero = false;        // compress: given, so strain counts anew after an earlier compression
   std::optional<double> start_gap;     // compress, crush [m]
   double stress = 0.0;                 // hold [Pa]
 };

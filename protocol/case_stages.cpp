@@ -42,6 +42,7 @@ void read_drive(TableReader& stage, const std::string& who, StageSpec& out) {
   stage.quantity("speed", Quantity::speed, positive, Need::required, out.speed);
   if (out.kind != StageKind::unload) {
     out.strain_zero = out.kind == StageKind::compress ? 5e3 : 20.0;
+    out.own_strain_zero = stage.has("strain_zero");
     stage.quantity("strain_zero", Quantity::stress, not_negative, Need::optional, out.strain_zero);
     stage.quantity("start_gap", Quantity::length, not_negative, Need::optional, out.start_gap);
   }

@@ -33,7 +33,7 @@ struct CheckReport {
   double memory = 0.0;                   // estimate [bytes]
   std::string scene, instruction_set, why_scene, why_instruction_set;
   int threads = 1;                       // that the engine makes use of
-  double particle_steps_per_second = 0.0;  // measured, dense bed
+  double particle_steps_per_second = 0.0;  // measured, dense bed; 0: could not be
   std::vector<ExpectedStage> stages;
   std::vector<std::string> notes;
 };

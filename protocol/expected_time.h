@@ -11,7 +11,7 @@
 namespace platen {
 
 struct EngineSpeed {
-  double particle_steps_per_second = 0.0;  // dense bed of the case's spheres and law
+  double particle_steps_per_second = 0.0;  // dense bed of the case's spheres and law; 0 where that bed fails
   std::string scene;                       // kernels that the engine chose
   std::string instruction_set;
   int threads = 1;                         // in use

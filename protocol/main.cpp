@@ -101,7 +101,7 @@ Command add_run(CLI::App& program) {
   app->add_option("--stop-after", command->stop_after, "end after this stage, by name or number")->type_name("STAGE");
   app->add_flag("--reproducible", command->reproducible, "the same bits on every instruction set; somewhat slower");
   app->add_flag("--force", command->force, "replace the run that is in the folder");
-  app->add_flag("!--no-report", command->report, "write no report.html");
+  app->add_flag_callback("--no-report", [command] { command->report = false; }, "write no report.html");
   app->add_flag("--json", command->json, "print the summary as JSON");
   app->add_flag("-q,--quiet", command->quiet, "print nothing but errors");
   return {app, "platen run protocol/cases/quick.toml -o runs/first --set stage.compress.speed='\"20 mm/s\"'", [=] {
@@ -119,7 +119,7 @@ Command add_resume(CLI::App& program) {
   add_threads(*app, command->threads);
   app->add_option("--max-walltime", *walltime, "stop after this time, e.g. \"90 s\", \"10 min\", \"2 h\"")->type_name("T");
   app->add_option("--stop-after", command->stop_after, "end after this stage, by name or number")->type_name("STAGE");
-  app->add_flag("!--no-report", command->report, "write no report.html");
+  app->add_flag_callback("--no-report", [command] { command->report = false; }, "write no report.html");
   app->add_flag("--json", command->json, "print the summary as JSON");
   app->add_flag("-q,--quiet", command->quiet, "print nothing but errors");
   return {app, "platen resume runs/first", [=] {
@@ -150,18 +150,16 @@ Command add_law(CLI::App& program) {
   auto cycle = std::make_shared<bool>(false);
   add_case(*app, command->case_file);
   add_overrides(*app, command->overrides);
-  auto* path = app->add_option_group("path", "one of them");
-  path->add_option("--overlap", command->overlap_file, "overlaps, one a line, in metres or with a unit; - reads standard input")
-      ->type_name("FILE");
-  path->add_flag("--cycle", *cycle, "loading, unloading, re-loading, adhesion, separation");
-  path->require_option(1);
+  auto* overlap = app->add_option("--overlap", command->overlap_file, "the overlaps, one a line, in metres or with a unit; - reads standard input")
+                      ->type_name("FILE");
+  app->add_flag("--cycle", *cycle, "instead: loading, unloading, re-loading, adhesion, separation")->excludes(overlap);
   app->add_option("--contact", *contact, "between two spheres, or a sphere and a plate")
       ->type_name("pair|plate")
       ->check(CLI::IsMember({"pair", "plate"}));
   app->add_option("--radius", *radius, "of the sphere (default: the case's; of a distribution the largest)")->type_name("LENGTH");
   app->add_option("-o,--output", command->output, "write the CSV there")->type_name("CSV");
   return {app, "platen law protocol/cases/load-dependent.toml --cycle -o law.csv", [=] {
-            if (!*cycle && command->overlap_file.empty()) throw UsageError("--overlap: the name of a file is missing");
+            if (!*cycle && command->overlap_file.empty()) throw UsageError("the overlaps are missing; allowed: --overlap FILE, or --cycle");
             command->plate = *contact == "plate";
             if (!radius->empty()) {
               command->radius = option_value("--radius", *radius, Quantity::length);
@@ -230,6 +228,21 @@ int usage_error(const std::string& message, const std::string& command) {
   return exit_usage;
 }
 
+// The first word of the command line that looks like an option and is none, with the nearest one that there is.
+std::optional<std::string> unknown_option(const CLI::App& app, int argc, char** argv) {
+  std::vector<std::string> known{"--help", "--version"};
+  for (const CLI::Option* option : app.get_options())
+    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+  for (int k = 1; k < argc; ++k) {
+    const std::string word = argv[k], name = word.substr(0, word.find('='));
+    if (word == "--") break;
+    if (!word.starts_with("--") || std::find(known.begin(), known.end(), name) != known.end()) continue;
+    const std::string nearest = nearest_word(name, known);
+    return fmt::format("there is no option {}{}", name, nearest.empty() ? "" : "; did you mean " + nearest + "?");
+  }
+  return std::nullopt;
+}
+
 int run_program(int argc, char** argv) {
   CLI::App program("Discrete element simulation of the uniaxial test of powders: fill, compress, unload, crush.", "platen");
   program.set_version_flag("--version", PLATEN_VERSION, "print the version");
@@ -262,7 +275,8 @@ int run_program(int argc, char** argv) {
     return program.exit(asked);
   } catch (const CLI::ParseError& error) {
     const auto chosen = program.get_subcommands();
-    return usage_error(error.what(), chosen.empty() ? "" : chosen.front()->get_name() + " ");
+    const CLI::App& app = chosen.empty() ? program : *chosen.front();
+    return usage_error(unknown_option(app, argc, argv).value_or(error.what()), chosen.empty() ? "" : app.get_name() + " ");
   }
   for (const Command& command : commands)
     if (command.app->parsed()) {

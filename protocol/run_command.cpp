@@ -32,7 +32,7 @@ void report_end(const RunOutcome& outcome, const fs::path& folder, bool quiet) {
   switch (outcome.exit_code) {
     case exit_done: break;
     case exit_stopped:
-      if (!quiet) spdlog::warn("{}; what there is so far: {}", outcome.message, folder.string());
+      if (!quiet) spdlog::warn("{}; what there is so far: {}; `platen resume {}` goes on", outcome.message, folder.string(), folder.string());
       break;
     default: spdlog::error("{}; what there is so far: {}", outcome.message, folder.string());
   }

@@ -188,9 +188,11 @@ int study_command(const StudyCommand& command) {
     const auto count = [&](std::optional<bool> holds) {
       return std::count_if(statements.begin(), statements.end(), [&](const Statement& s) { return s.holds == holds; });
     };
-    if (!statements.empty())
-      print(fmt::format("statements: {} hold, {} do not hold, {} not judged (statements.md)\n", count(true),
-                        count(false), count(std::nullopt)));
+    if (!statements.empty()) {
+      const bool few = std::any_of(statements.begin(), statements.end(), [](const Statement& s) { return s.seeds < 3; });
+      print(fmt::format("statements: {} hold, {} do not hold, {} not judged (statements.md{})\n", count(true),
+                        count(false), count(std::nullopt), few ? "; provisional where there are fewer than three seeds" : ""));
+    }
     print(fmt::format("results: {} (study.h5, statements.md, runs.csv, runs/, {})\n", command.folder.string(),
                       study.parts.empty() ? "tables/, figures/" : "tables/ and figures/ in a folder for each part"));
   }

@@ -214,5 +214,13 @@ TEST(CheckCommand, AStageThatItsTimeDoesNotSufficeForHasANote) {
   EXPECT_NE(slow.find("max_duration = 60 s ends the run before that (exit code 6)"), std::string::npos) << slow;
 }
 
+// Springs so soft that plates are ten thousand times as stiff, and adhesion that pulls a bed of them together: check still says all.
+TEST(CheckCommand, SaysItsNumbersOfSoftAndStickySpheres) {
+  const std::vector<std::string> fine{"particles.radius=50e-6", "particles.law.k1=0.05", "particles.law.k2=0.25", "particles.law.f0=-1e-6"};
+  const CheckReport r = check_report(good(fine), 1);
+  EXPECT_GT(r.particle_steps_per_second, 0.0);
+  EXPECT_TRUE(r.bond_number);
+}
+
 }  // namespace
 }  // namespace platen::test

@@ -136,7 +136,7 @@ TEST(Compress, DisplacementAndDurationAreExact) {
 
 TEST(Compress, StartGap) {
   Bench bench(small_bed + fill + press + press +
-              "[[stage]]\nkind = \"compress\"\nspeed = \"50 mm/s\"\nuntil = { duration = \"1 ms\" }\n");
+              "[[stage]]\nkind = \"compress\"\nspeed = \"50 mm/s\"\nstrain_zero = \"1 kPa\"\nuntil = { duration = \"1 ms\" }\n");
   bench.drive(0);
   const double parked = bench.sim->plane_position(plate_top);
   Stand last = bench.stand(3);
@@ -156,7 +156,11 @@ TEST(Compress, StartGap) {
   PressStage again{-1.0};
   again.begin(second);
   EXPECT_EQ(bench.sim->plane_position(plate_top), loaded) << "a loaded plate stays";
-  EXPECT_FALSE(second.strain_zero_height) << "every compression has its own zero";
+  ASSERT_TRUE(bench.strain_zero_height) << "the first compression has a zero";
+  EXPECT_EQ(second.strain_zero_height, bench.strain_zero_height) << "load steps of one bed have one strain";
+  Stand third = bench.stand(3);
+  without.begin(third);
+  EXPECT_FALSE(third.strain_zero_height) << "a compression that names its own zero counts anew";
 }
 
 TEST(Unload, KeepsTheZeroOfTheCompressionAndLeavesTheWeight) {

@@ -22,7 +22,9 @@ void PressStage::begin(Stand& stand) {
   top.velocity = direction * stand.spec.speed;
   sim.set_plane(plate_top, top);
   start_position = top.origin;
-  if (direction < 0.0) stand.strain_zero_height.reset();
+  // Load steps of one bed have one strain: the first compression's zero stays, unless a later one names its own.
+  const bool goes_on = stand.spec.kind == StageKind::compress && !stand.spec.own_strain_zero;
+  if (direction < 0.0 && !goes_on) stand.strain_zero_height.reset();
 }
 
 void PressStage::update(Stand& stand, const Look& look) {

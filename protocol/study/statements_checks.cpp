@@ -284,7 +284,7 @@ void judge_scans(Judge& judge) {
                 fmt::format("{:g}", scan.best_tried), scan.best_tried == wanted);
     const std::string text = fmt::format("{}: the minimum lies at {:g}, within its 95 % interval", what, wanted);
     if (!scan.minimum || !scan.minimum->inside)
-      judge.say("scan", text, "no minimum inside the scan", false);
+      judge.say("scan", text, "no minimum inside the scan", scan.minimum && scan.minimum->degrees == 0 ? std::nullopt : std::optional(false));
     else if (!std::isfinite(scan.minimum->uncertainty) || scan.minimum->degrees == 0)
       judge.say("scan", text, fmt::format("{:.3f} (uncertainty unknown)", scan.minimum->power), std::nullopt);
     else {
