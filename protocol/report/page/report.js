@@ -305,7 +305,12 @@
       this.extent = extent;
       const middle = extent.low.map((v, a) => 0.5 * (v + extent.high[a])), size = Math.hypot(...extent.low.map((v, a) => extent.high[a] - v));
       this.controls.target.set(...middle);
-      this.camera.position.set(middle[0] + 0.65 * size, middle[1] - 1.5 * size, middle[2] + 0.45 * size);
+      // So far away that the ball around the whole bed is in view.
+      let largest = 0;
+      for (let k = 0; k < n; ++k) largest = Math.max(largest, this.R(k));
+      const distance = (0.5 * size + largest) / Math.sin(0.5 * this.camera.fov * Math.PI / 180);
+      const away = new THREE.Vector3(0.65, -1.5, 0.45).normalize().multiplyScalar(distance);
+      this.camera.position.set(middle[0] + away.x, middle[1] + away.y, middle[2] + away.z);
       this.camera.near = 0.01 * size, this.camera.far = 20 * size;
       this.controls.update();
       this.paint();
