@@ -65,6 +65,7 @@ struct BoxSpec {
 
 struct TimeSpec {
   std::optional<double> step;  // fixed step [s]; empty = "auto"
+  std::string step_where;      // file:line:column of a fixed step, for messages
   double safety = 0.3;  // justified in docs/accuracy.md
   bool allow_unstable = false;
 };

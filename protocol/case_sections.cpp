@@ -236,6 +236,7 @@ void read_sections(TableReader& root, Case& c, CaseFacts& facts, Problems& probl
 
   TableReader time = root.table("time");
   time.quantity_or("step", Quantity::time, positive, "auto", c.time.step);
+  if (c.time.step) c.time.step_where = to_string(time.where("step"));
   time.number("safety", proper_part, Need::optional, c.time.safety);
   time.flag("allow_unstable", c.time.allow_unstable);
   time.refuse_unknown("time");

@@ -200,7 +200,8 @@ Experiment::End Experiment::run_stage(std::size_t index, bool on_the_way) {
   if (frame_interval(spec) > 0.0 && end != End::stopped) add_frame();
   const Measures& m = current_.last.measures;
   if (spec.kind == StageKind::hold && end != End::stopped && std::fabs(m.stress_top - spec.stress) > 0.02 * spec.stress)
-    warn(fmt::format("the stress at its end is {}, not {}: a longer duration lets it settle", pretty(m.stress_top, "Pa"), pretty(spec.stress, "Pa")));
+    warn(!m.top_touches ? "the top plate has not come to the bed: `compress` before it, or a longer duration"
+                        : fmt::format("the stress at its end is {}, not {}: a longer duration lets it settle", pretty(m.stress_top, "Pa"), pretty(spec.stress, "Pa")));
   const double dissipated = m.ledger.dissipated();
   current_.residual_share = !c_.output.energy ? std::numeric_limits<double>::quiet_NaN() : (m.energy_residual - residual_before) / std::max(dissipated - dissipated_before, 0.01 * dissipated);
   if (std::fabs(current_.residual_share) > 0.01) warn(fmt::format("the energy ledger is open by {:.2g} % of what was dissipated; a smaller time step closes it", 100.0 * std::fabs(current_.residual_share)));

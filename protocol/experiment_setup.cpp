@@ -83,7 +83,7 @@ void refuse_unstable_step(const Case& c) {
   if (*c.time.step <= 0.9 * first.limits.dt_limit) return;
   throw CaseError(fmt::format("{}: time.step: {:.4g} s is above 0.9 dt_limit = {:.4g} s (dt_crit {:.4g} s) of a dense bed; a smaller "
                               "step, \"auto\", or time.allow_unstable = true",
-                              c.file.string(), *c.time.step, 0.9 * first.limits.dt_limit, first.limits.dt_crit));
+                              c.time.step_where.empty() ? c.file.string() : c.time.step_where, *c.time.step, 0.9 * first.limits.dt_limit, first.limits.dt_crit));
 }
 
 namespace {

@@ -303,6 +303,18 @@ TEST(TimeStep, AFixedStepAboveTheLimitIsRefused) {
     EXPECT_NE(std::string(error.what()).find("time.step"), std::string::npos);
     EXPECT_NE(std::string(error.what()).find("dt_limit"), std::string::npos);
   }
+  try {
+    std::string text = small_bed + fill;
+    const std::size_t at = text.find("[time]");
+    ASSERT_NE(at, std::string::npos);
+    text.replace(at, text.find('\n', text.find("step =", at)) - at, "[time]\nstep = 1e-3");
+    refuse_unstable_step(parse_case(text, "case.toml", "."));
+    ADD_FAILURE() << "a step of a millisecond";
+  } catch (const CaseError& error) {
+    const std::string said = error.what();
+    EXPECT_EQ(said.find("case.toml:"), 0u) << said;
+    EXPECT_NE(said.find(":8: time.step: 0.001 s"), std::string::npos) << said;
+  }
 }
 
 // 21 us are fine for the loose bed; under load the plates' contacts stiffen and the limit falls below.
