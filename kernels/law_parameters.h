@@ -29,6 +29,7 @@ struct PairLaw {
   double rolling_friction = 0.0;        // mu_r [-]
   RollingModel rolling_model = RollingModel::absolute;
   FrictionLimit friction_limit = FrictionLimit::adhesive;
+  bool operator==(const PairLaw&) const = default;
 };
 
 // Hertz-Mindlin between a sphere and a plane (plate or wall), total form [EDEM, A16 and A17 in docs/laws.md].
@@ -40,6 +41,7 @@ struct PlateLaw {
   double restitution = 0.4;               // e [-]
   double friction = 0.3;                  // mu [-]
   double rolling_friction = 0.001;        // mu_r [-]
+  bool operator==(const PlateLaw&) const = default;
 };
 
 }  // namespace platen

@@ -26,6 +26,7 @@ struct SizeDistribution {
   std::vector<double> weights;  // list: relative numbers, same length as radii; empty = equal
   double largest() const;       // largest radius that can occur [m]
   double smallest() const;      // smallest radius that can occur [m]
+  bool operator==(const SizeDistribution&) const = default;
 };
 
 // Explicit particles, one entry each. Velocities are those at t = 0.
@@ -53,6 +54,7 @@ struct PlateSpec {
   bool top = true;
   bool bottom = true;
   PlateLaw law;
+  bool operator==(const PlateSpec&) const = default;
 };
 
 struct BoxSpec {
@@ -61,6 +63,7 @@ struct BoxSpec {
   double depth = 0.0;  // y [m]
   double height = 0.0; // gap between the plates at the start [m]
   Sides sides = Sides::periodic;
+  bool operator==(const BoxSpec&) const = default;
 };
 
 struct TimeSpec {
@@ -84,6 +87,7 @@ struct EngineSpec {
   std::optional<double> inner_gap;  // [m]; empty = "auto"
   std::optional<int> batch;         // particles; empty = "auto"
   int check_every = 32;             // steps
+  bool operator==(const EngineSpec&) const = default;
 };
 
 enum class StageKind { fill, vibrate, settle, compress, unload, hold, release, crush, run };
@@ -100,6 +104,7 @@ struct Until {
   double kinetic_to_potential = 1e-5;  // [-]   settle, release
   double coordination_change = 0.005;  // [-]   settle, release
   double window = 0.1;                 // [s]   settle, release
+  bool operator==(const Until&) const = default;
 };
 
 struct StageSpec {
@@ -119,6 +124,7 @@ struct StageSpec {
   bool own_strain_zero = false;        // compress: given, so strain counts anew after an earlier compression
   std::optional<double> start_gap;     // compress, crush [m]
   double stress = 0.0;                 // hold [Pa]
+  bool operator==(const StageSpec&) const = default;
 };
 
 struct Case {

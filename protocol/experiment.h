@@ -84,6 +84,7 @@ struct CheckpointFacts {
   std::size_t rows = 0;                // of series.csv
   std::vector<double> frames;          // their times [s]
   std::size_t stage = 0;               // to go on with, from 0
+  bool within = false;                 // in the middle of that stage
   std::vector<StageResult> closed;
 };
 CheckpointFacts facts_of(const Checkpoint& checkpoint);

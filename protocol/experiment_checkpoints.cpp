@@ -101,6 +101,7 @@ CheckpointFacts facts_of(const Checkpoint& checkpoint) try {
   facts.rows = experiment.at("rows").get<std::size_t>();
   fields::from_json(experiment.at("frames"), facts.frames);
   facts.stage = experiment.at("stage").at("index").get<std::size_t>();
+  facts.within = experiment.at("stage_open").get<bool>();
   fields::from_json(experiment.at("closed"), facts.closed);
   return facts;
 } catch (const nlohmann::json::exception& error) {

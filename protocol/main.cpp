@@ -97,6 +97,7 @@ Command add_run(CLI::App& program) {
       ->type_name("DIR");
   add_threads(*app, command->threads);
   add_overrides(*app, command->overrides);
+  app->add_option("--from", command->from, "begin with the bed of another run, stopped by --stop-after; stages up to there must be the same")->type_name("DIR");
   app->add_option("--max-walltime", *walltime, "stop after this time, e.g. \"90 s\", \"10 min\", \"2 h\"")->type_name("T");
   app->add_option("--stop-after", command->stop_after, "end after this stage, by name or number")->type_name("STAGE");
   app->add_flag("--reproducible", command->reproducible, "the same bits on every instruction set; somewhat slower");

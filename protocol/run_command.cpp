@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "kernels/kernel_table.h"
+#include "protocol/branch.h"
 #include "protocol/experiment.h"
 #include "protocol/info.h"
 #include "protocol/output.h"
@@ -131,7 +132,53 @@ int carry_out(Course& course) {
 
 }  // namespace
 
+namespace {
+
+// `platen run --from`: as a new run in its folder, as a resumed one in all else.
+int branch_command(const RunCommand& command) {
+  const fs::path& of = command.from;
+  if (!fs::exists(of / "case.toml") || !fs::exists(of / "series.csv")) throw OutputError(of.string() + ": is not a run folder");
+  if (!has_checkpoint(of))
+    throw UsageError(fmt::format("--from: {} has no checkpoint, as runs that came to their end; allowed: a run stopped by --stop-after", of.string()));
+  const Case c = read_case(command.case_file, command.overrides, CaseUse::resume);
+  refuse_unstable_step(c);
+  std::string passed_over;
+  const Checkpoint from = newest_checkpoint(of, passed_over);
+  const CheckpointFacts facts = facts_of(from);
+  if (facts.within)
+    throw UsageError(fmt::format("--from: {} stands in the middle of a stage; allowed: one stopped by --stop-after, as by `platen resume {} --stop-after {}`", of.string(),
+                                 of.string(), facts.stage + 1));
+  refuse_other_history(c, from, facts.stage, of);
+  if (command.reproducible && !from.reproducible) throw UsageError(fmt::format("--reproducible: {} was run without it", of.string()));
+  RunOptions options;
+  options.threads = command.threads.value_or(usable_cores());
+  options.reproducible = from.reproducible;
+  options.max_walltime = command.max_walltime;
+  if (!command.stop_after.empty()) {
+    options.stop_after = stage_named(c, command.stop_after);
+    for (std::size_t k = 0; k < facts.stage; ++k)
+      if (c.stages[k].name == options.stop_after) throw UsageError(fmt::format("--stop-after: {} has left stage \"{}\" behind", of.string(), options.stop_after));
+  }
+  const fs::path path = command.folder.empty() ? free_run_folder(command.case_file) : command.folder;
+  if (fs::exists(path) && fs::equivalent(path, of)) throw UsageError(fmt::format("--from: {} is the folder of the new run too; allowed: another -o", of.string()));
+  catch_stop_signals(command.quiet);
+  make_simulation(c, from, 1);  // fails before the folder is touched, if it does
+  const std::string start = RunFolder::create(path, c.text, command.force).start_time();
+  copy_history(of, from, path, c.text, start);
+  RunFolder folder = RunFolder::reopen(RunFolder::hold(path), path, facts.rows, facts.closed, facts.frames, start);
+  if (!passed_over.empty()) spdlog::warn("{}; going on from the checkpoint before it", passed_over);
+  if (!command.quiet)
+    spdlog::info("{}: {} spheres, from {} after stage {}, {} of {} stages are left, {} thread{}, into {}", command.case_file.filename().string(), from.bed.id.size(), of.string(),
+                 c.stages[facts.stage - 1].name, c.stages.size() - facts.stage, c.stages.size(), options.threads, options.threads == 1 ? "" : "s", path.string());
+  folder.log("from", {{"run", of.string()}, {"step", from.bed.step}, {"after", c.stages[facts.stage - 1].name}});
+  Course course{c, folder, options, &from, command.report, command.json, command.quiet};
+  return carry_out(course);
+}
+
+}  // namespace
+
 int run_command(const RunCommand& command) {
+  if (!command.from.empty()) return branch_command(command);
   // Everything that can be wrong with the request is found before the folder is touched.
   const Case c = read_case(command.case_file, command.overrides);
   refuse_unstable_step(c);

@@ -359,6 +359,90 @@ Checkpoint small_checkpoint() {
   return c;
 }
 
+// ---- `platen run --from`: a bed that is made once and then goes different ways
+
+const std::string bed_and_more = small_bed + "frames = \"10 ms\"\n" + fill + quick_settle + press + unload;
+
+TEST(RunFrom, LeavesWhatAWholeRunLeaves) {
+  TemporaryFolder root;
+  write_file(root / "case.toml", bed_and_more);
+  const std::string file = (root / "case.toml").string(), bed = (root / "bed").string();
+  ASSERT_EQ(run_program({"run", file, "-o", (root / "whole").string(), "-q", "--no-report"}).exit_code, 0);
+  ASSERT_EQ(run_program({"run", file, "-o", bed, "-q", "--no-report", "--stop-after", "settle"}).exit_code, 0);
+  const std::string series = read_file(root / "bed/series.csv"), checkpoint = read_file(root / "bed/checkpoint.h5");
+  ProgramResult result = run_program({"run", file, "--from", bed, "-o", (root / "again").string(), "--no-report"});
+  ASSERT_EQ(result.exit_code, 0) << result.report();
+  EXPECT_TRUE(has(result.err, "after stage settle, 2 of 4 stages are left")) << result.err;
+  expect_same_run(root / "whole", root / "again");
+  // Stopped at once and resumed, in a folder that held another run.
+  result = run_program({"run", file, "--from", bed, "-o", (root / "again").string(), "--force", "-q", "--no-report", "--max-walltime", "1e-9"});
+  ASSERT_EQ(result.exit_code, 75) << result.report();
+  ASSERT_EQ(run_program({"resume", (root / "again").string(), "-q", "--no-report"}).exit_code, 0);
+  expect_same_run(root / "whole", root / "again");
+  EXPECT_EQ(read_file(root / "bed/series.csv"), series) << "the bed is only read";
+  EXPECT_EQ(read_file(root / "bed/checkpoint.h5"), checkpoint);
+}
+
+TEST(RunFrom, LaterStagesMayBeOthers) {
+  TemporaryFolder root;
+  write_file(root / "case.toml", bed_and_more);
+  const std::string file = (root / "case.toml").string(), bed = (root / "bed").string();
+  ASSERT_EQ(run_program({"run", file, "-o", bed, "-q", "--no-report", "--stop-after", "settle"}).exit_code, 0);
+  // Another end, other names and fewer stages, another output.
+  write_file(root / "soft.toml", small_bed + fill + quick_settle + "[[stage]]\nkind = \"compress\"\nname = \"gently\"\nspeed = \"50 mm/s\"\nuntil = { stress = \"5 kPa\" }\n");
+  const std::vector<std::string> soft{"run", (root / "soft.toml").string(), "-q", "--no-report"};
+  const auto with = [&](std::vector<std::string> words, const std::vector<std::string>& more) {
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  };
+  ProgramResult result = run_program(with(soft, {"--from", bed, "-o", (root / "branch").string()}));
+  ASSERT_EQ(result.exit_code, 0) << result.report();
+  ASSERT_EQ(run_program(with(soft, {"-o", (root / "whole").string()})).exit_code, 0);
+  EXPECT_EQ(read_file(root / "branch/series.csv"), read_file(root / "whole/series.csv"));
+  EXPECT_EQ(Json::parse(read_file(root / "branch/summary.json")).at("state_hash"), Json::parse(read_file(root / "whole/summary.json")).at("state_hash"));
+  EXPECT_EQ(read_file(root / "branch/case.toml"), read_file(root / "whole/case.toml"));
+}
+
+TEST(RunFrom, WhatDoesNotFitIsSaidAndNothingWritten) {
+  TemporaryFolder root;
+  write_file(root / "case.toml", bed_and_more);
+  const std::string file = (root / "case.toml").string(), bed = (root / "bed").string(), done = (root / "done").string(), out = (root / "out").string();
+  ASSERT_EQ(run_program({"run", file, "-o", bed, "-q", "--no-report", "--stop-after", "settle"}).exit_code, 0);
+  ASSERT_EQ(run_program({"run", file, "-o", done, "-q", "--no-report"}).exit_code, 0);
+  ASSERT_EQ(run_program({"run", file, "-o", (root / "within").string(), "-q", "--no-report", "--max-walltime", "1e-9"}).exit_code, 75);
+  struct {
+    std::vector<std::string> words;
+    int code;
+    const char* expected;
+  } wrong[] = {
+      {{"--from", bed, "--set", "particles.law.friction=0.1"}, 3, "particles.law is not as in"},
+      {{"--from", bed, "--set", "particles.count=90"}, 3, "particles is not as in"},
+      {{"--from", bed, "--set", "plates.friction=0.1"}, 3, "plates is not as in"},
+      {{"--from", bed, "--set", "box.height=0.09"}, 3, "box is not as in"},
+      {{"--from", bed, "--set", "environment.gravity=5"}, 3, "environment is not as in"},
+      {{"--from", bed, "--set", "time.step=\"9 us\""}, 3, "time is not as in"},
+      {{"--from", bed, "--set", "output.energy=false"}, 3, "output.energy is not as in"},
+      {{"--from", bed, "--set", "engine.check_every=16"}, 3, "engine is not as in"},
+      {{"--from", bed, "--set", "stage.settle.until.window=\"30 ms\""}, 3, "stage 2 (settle) is not as in"},
+      {{"--from", bed, "--stop-after", "fill"}, 2, "has left stage \"fill\" behind"},
+      {{"--from", bed, "--reproducible"}, 2, "was run without it"},
+      {{"--from", done}, 2, "has no checkpoint"},
+      {{"--from", (root / "within").string()}, 2, "in the middle of a stage"},
+      {{"--from", (root / "nowhere").string()}, 5, "is not a run folder"},
+  };
+  for (const auto& w : wrong) {
+    std::vector<std::string> words{"run", file, "-o", out};
+    words.insert(words.end(), w.words.begin(), w.words.end());
+    const ProgramResult result = run_program(words);
+    EXPECT_EQ(result.exit_code, w.code) << w.expected << result.report();
+    EXPECT_TRUE(has(result.err, w.expected)) << result.report();
+    EXPECT_FALSE(fs::exists(out)) << w.expected;
+  }
+  const ProgramResult same = run_program({"run", file, "--from", bed, "-o", bed, "--force"});
+  EXPECT_EQ(same.exit_code, 2) << same.report();
+  EXPECT_TRUE(fs::exists(root / "bed/checkpoint.h5"));
+}
+
 TEST(CheckpointFile, EveryBitIsWatched) {
   TemporaryFolder root;
   write_checkpoint(root.path(), small_checkpoint());
