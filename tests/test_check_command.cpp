@@ -203,6 +203,17 @@ TEST(CheckCommand, NotesOnWhatARunWouldShowLate) {
   const std::size_t release = quick.find("[[stage]]\nkind = \"release\""), crush = quick.find("[[stage]]", release + 1);
   ASSERT_LT(crush, quick.size());
   EXPECT_NE(notes_of({}, quick.substr(0, release) + quick.substr(crush)).find("crush: the sides are still there"), std::string::npos);
+  const std::size_t compress = quick.find("[[stage]]\nkind = \"compress\""), unload = quick.find("[[stage]]", compress + 1);
+  ASSERT_LT(unload, release);
+  EXPECT_NE(notes_of({}, quick.substr(0, compress) + quick.substr(unload)).find("unload: nothing has pressed before it"), std::string::npos);
+  EXPECT_NE(notes_of({}, quick + quick.substr(compress, unload - compress)).find("compress-2: there are no sides"), std::string::npos);
+  EXPECT_FALSE(has("nothing has pressed", {}));
+  EXPECT_FALSE(has("there are no sides", {}));
+  // Load steps of one bed have one strain zero.
+  const Case steps = parse_case(quick.substr(0, unload) + quick.substr(compress, unload - compress), "case.toml", ".");
+  int zeros = 0;
+  for (const InertialNumber& i : check_report(steps, 1).inertial) zeros += i.of == "strain zero";
+  EXPECT_EQ(zeros, 1);
   EXPECT_FALSE(has("near dt_limit", {"time.step=\"5 us\""}));
   EXPECT_TRUE(has("near dt_limit", {"time.step=\"20 us\""}));
 }
