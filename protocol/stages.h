@@ -23,6 +23,9 @@
 
 namespace platen {
 
+// A sample that keeps less of its height than this when its sides go fell over or to pieces: what a crush finds then is not its strength.
+inline constexpr double standing = 0.8;
+
 // What stages work on and hand to each other.
 struct Stand {
   Simulation& sim;

@@ -3,6 +3,7 @@
 #include <deque>
 #include <set>
 
+#include "protocol/study/observables.h"
 #include "tests/experiment_case.h"
 
 namespace platen::test {
@@ -278,6 +279,22 @@ TEST(Release, ASampleThatFallsOverIsTold) {
   EXPECT_FALSE(warned(protocol_run().stage("release")));
   const Trial run = run_case(small_bed + fill + quick_settle + press + unload + "[[stage]]\nkind = \"release\"\nmax_duration = \"0.3 s\"\n", {"particles.law.k_adh=0.0"});
   EXPECT_TRUE(warned(run.outcome.stages.back())) << run.outcome.message;
+}
+
+// What is crushed of a sample that fell is not a sample: a study does not count it.
+TEST(Release, AStudyTakesNoStrengthOfASampleThatFell) {
+  const std::string freed = "[[stage]]\nkind = \"release\"\nuntil = { kinetic_to_potential = 0.1, coordination_change = 1, window = \"0.2 s\" }\n"
+                            "[[stage]]\nkind = \"crush\"\nspeed = \"50 mm/s\"\nstart_gap = \"0.1 mm\"\nuntil = { strain = 0.1 }\n";
+  for (const bool sticky : {true, false}) {
+    const Trial run = run_case(small_bed + fill + quick_settle + press + unload + freed, {sticky ? "particles.law.k_adh=5e3" : "particles.law.k_adh=0.0"});
+    ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
+    ASSERT_TRUE(run.stage("crush").strength) << "nothing was crushed: the test shows nothing";
+    const RunMeasures found = measure_run(run.path(), run.c, std::nullopt);
+    EXPECT_TRUE(found.scalars.contains("coordination_released"));
+    for (const char* name : {"strength", "strength_strain"}) EXPECT_EQ(found.scalars.contains(name), sticky) << name;
+    EXPECT_EQ(found.scalars.contains("initial_stiffness"), sticky && run.stage("crush").initial_stiffness);
+    EXPECT_EQ(found.curves.contains("unconfined"), sticky);
+  }
 }
 
 TEST(Release, TheFreeBedComesToRest) {

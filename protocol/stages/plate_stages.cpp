@@ -139,11 +139,10 @@ void ReleaseStage::begin(Stand& stand) {
   rest.begin(stand);
 }
 
-// A sample that stands a little lower has settled; one that lost a fifth of its height fell over or to pieces, and what a crush
-// finds then is not its strength.
+// A sample that stands a little lower has settled.
 void ReleaseStage::end(Stand& stand, StageResult& result) {
   const double height = height_of_bed(stand.sim);
-  if (height < 0.8 * height_before)
+  if (height < standing * height_before)
     result.warnings.push_back(fmt::format("the sample fell over or to pieces: {} high with its sides, {} without; a strength found later is not its own; a wider box or more cohesion helps", pretty(height_before, "m"), pretty(height, "m")));
 }
 

@@ -12,6 +12,7 @@
 #include "protocol/output/hdf5_file.h"
 #include "protocol/output/results_h5.h"
 #include "protocol/output/series_csv.h"
+#include "protocol/stages.h"
 #include "protocol/study/settled_sample.h"
 
 namespace platen {
@@ -205,12 +206,16 @@ void measure_compression(const SeriesTable& series, const Case& c, std::optional
   put(out, "stress_top_unloaded", up.stress_top.back());
 }
 
+// Whether the sample lost its shape when its sides went, and with it the strength that the crush looks for.
+bool fell(const StageRows& release) { return !release.empty() && release.height.back() < standing * release.height.front(); }
+
 void measure_crush(const SeriesTable& series, const Case& c, RunMeasures& out) {
   const StageRows release = rows_of(series, first_stage(c, StageKind::release));
   if (!release.empty()) {
     put(out, "coordination_released", release.coordination.back());
     put(out, "stress_bottom_released", at_end(release, release.stress_bottom));
   }
+  if (fell(release)) return;
   const std::string name = first_stage(c, StageKind::crush);
   const StageRows rows = rows_of(series, name);
   if (rows.empty()) return;
@@ -313,7 +318,7 @@ RunMeasures measure_run(const std::filesystem::path& folder, const Case& c, std:
   put(out, "largest_overlap", largest_overlap(results.root(), c));
   put(out, "porosity_settled", settled_porosity(results.root(), c).value_or(nan));
   const nlohmann::json summary = nlohmann::json::parse(read_whole_file(folder / "summary.json"), nullptr, false);
-  const std::string crush = first_stage(c, StageKind::crush);
+  const std::string crush = fell(rows_of(series, first_stage(c, StageKind::release))) ? "" : first_stage(c, StageKind::crush);
   if (summary.is_object() && summary.contains("stages"))
     for (const auto& stage : summary["stages"]) {
       if (crush.empty() || stage.value("name", "") != crush) continue;
