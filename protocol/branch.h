@@ -10,8 +10,8 @@
 
 namespace platen {
 
-// Throws CaseError, one line for each thing in which the case `c` is another than that of the run whose checkpoint this is: in particles, plates, box,
-// environment, engine, time, output.energy, and the first `stages` stages (how often they write frames aside). Titles, seeds, output and later stages are free.
+// Throws CaseError, one line for each thing in which the case `c` is another than that of the run whose checkpoint this is: seed, particles, plates, box,
+// environment, engine, time, output.energy, and the first `stages` stages (how often they write frames aside). Title, output and later stages are free.
 void refuse_other_history(const Case& c, const Checkpoint& checkpoint, std::size_t stages, const std::filesystem::path& run);
 
 // Puts what a run wrote up to its checkpoint into the folder of another one, where `reopen` can take it up, and a checkpoint

@@ -12,8 +12,8 @@ bool one_radius(TableReader& law, std::string_view key, const ParticleSpec& part
   R = particles.sizes.radius;
   if (particles.sizes.kind == SizeDistribution::Kind::mono && R > 0.0) return true;
   law.error(key,
-            "is given by material data, which needs particles.radius; allowed: spheres of one radius, or a number, which `platen check` says of "
-            "a case with the mean radius");
+            "is given by material data, which needs particles.radius; allowed: spheres of one radius, or a number (`platen check` "
+            "of the same case with one radius prints it)");
   return false;
 }
 

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "kernels/kernel_table.h"
 #include "protocol/experiment.h"
@@ -56,7 +57,7 @@ void add_inertial_numbers(const Case& c, CheckReport& report) {
           {s.name, stress, of, s.speed / height * 2.0 * f.radius_mean * std::sqrt(f.density / stress)});
     };
     if (!(s.kind == StageKind::compress && pressed && !s.own_strain_zero)) add(s.strain_zero, "strain zero");
-    pressed = true;
+    pressed = pressed || !s.until.stress || *s.until.stress >= s.strain_zero;
     if (s.until.stress) add(*s.until.stress, "target");
   }
 }
@@ -74,14 +75,26 @@ void add_notes(const Case& c, CheckReport& report) {
     report.notes.push_back("time.step is near dt_limit of a bed without plates; spheres at a plate may have half of it, and a run looks at its own bed");
   if (const PairLaw& law = c.particles.law; law.rolling_friction == 0.0 && (law.f0 != 0.0 || law.k_adh > 0.0))
     report.notes.push_back("rolling_friction = 0 with cohesion: a sphere held between two others may spin on, and a bed take long to come to rest");
-  bool sides = c.box.given && c.box.sides != Sides::open, pressed = false;
+  bool sides = c.box.given && c.box.sides != Sides::open, pressed = false, has_zero = false;
   for (const StageSpec& s : c.stages) {
     if (s.kind == StageKind::release) sides = false;
-    if (s.kind == StageKind::unload && !pressed) report.notes.push_back(s.name + ": nothing has pressed before it, so it ends at once");
+    // Rumpf: a contact of a dense bed carries about pi d^2 sigma / ((1 - porosity) Z); largest overlaps are some five times the mean.
+    if (s.kind == StageKind::compress && s.until.stress) {
+      const PairLaw& law = c.particles.law;
+      const double d = 2.0 * report.spheres.radius_mean, force = std::numbers::pi * d * d * *s.until.stress / ((1.0 - dense_porosity) * 6.0);
+      const double overlap = std::pow(force / law.k1, 1.0 / law.exponent) / d;
+      if (overlap > 0.1)
+        report.notes.push_back(fmt::format("{}: {} makes overlaps of some {:.0f} % of a diameter, several times more in places: the law is meant for small ones; stiffer spheres or less load help",
+                                           s.name, pretty(*s.until.stress, "Pa"), 100.0 * overlap));
+    }
+    if (s.kind == StageKind::unload && s.until.stress && !pressed) report.notes.push_back(s.name + ": nothing has pressed before it, so it ends at once");
     if (s.kind == StageKind::compress && !sides) report.notes.push_back(s.name + ": there are no sides, so this is no confined compression; `crush` finds the strength of such a bed");
     pressed = pressed || s.kind == StageKind::compress || s.kind == StageKind::crush || s.kind == StageKind::hold || (s.kind == StageKind::fill && s.method == FillMethod::grow);
     if (s.kind == StageKind::crush && sides) report.notes.push_back(s.name + ": the sides are still there: its strength will not be an unconfined one; a stage `release` takes them away");
-    if (s.kind == StageKind::compress && s.until.stress && *s.until.stress < s.strain_zero)
+    if (s.kind == StageKind::vibrate || s.kind == StageKind::release) has_zero = false;
+    const bool goes_on = s.kind == StageKind::compress && has_zero && !s.own_strain_zero;
+    has_zero = goes_on || (has_zero && s.kind != StageKind::compress) || (s.kind == StageKind::compress && (!s.until.stress || *s.until.stress >= s.strain_zero));
+    if (s.kind == StageKind::compress && !goes_on && s.until.stress && *s.until.stress < s.strain_zero)
       report.notes.push_back(fmt::format("{}: ends at {} before strain begins to count at {} (strain_zero)", s.name, pretty(*s.until.stress, "Pa"), pretty(s.strain_zero, "Pa")));
   }
   for (std::size_t k = 0; k < report.stages.size(); ++k)

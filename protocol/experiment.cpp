@@ -40,7 +40,7 @@ RunOutcome Experiment::run() {
         outcome.message = fmt::format("stopped in stage {}: {}", closed_.back().name, closed_.back().end_reason);
         break;
       }
-      if (c_.stages[k].name == options_.stop_after && k + 1 < c_.stages.size()) {
+      if (c_.stages[k].name == options_.stop_after) {  // also behind the last one: others may begin there
         keep_between(k + 1);
         break;
       }
@@ -64,7 +64,7 @@ RunOutcome Experiment::run() {
   folder_.finish(outcome.exit_code, outcome.exit_code == exit_numerical ? std::nullopt : std::optional(outcome.state_hash),
                  outcome.performance, outcome.stages);
   folder_.log("end", {{"exit_code", outcome.exit_code}, {"wall_seconds", wall_clock() - wall_begin_}});
-  if (outcome.exit_code == exit_done && closed_.size() == c_.stages.size()) remove_checkpoints(folder_.path());  // nothing is left to do
+  if (outcome.exit_code == exit_done && closed_.size() == c_.stages.size() && options_.stop_after.empty()) remove_checkpoints(folder_.path());  // nothing is left to do
   return outcome;
 }
 

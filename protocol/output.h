@@ -83,6 +83,11 @@ class RunFolder {
   // Whether a process works in the folder at this moment.
   static bool in_use(const std::filesystem::path& folder);
 
+  // Keeps writers out of a run's folder while it is read, other readers not. Throws OutputError where one is at work.
+  static UniqueFd read_lock(const std::filesystem::path& folder);
+
+  UniqueFd close() && { return std::move(lock_); }  // the lock stays, for `reopen`
+
   const std::filesystem::path& path() const { return path_; }
   const std::string& start_time() const { return start_time_; }  // of the run, ISO 8601
   void set_info(RunInfo info) { info_ = std::move(info); }  // before the first close_stage

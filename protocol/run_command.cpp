@@ -91,6 +91,7 @@ struct Course {
   RunFolder& folder;
   RunOptions options;
   const Checkpoint* from = nullptr;
+  bool fresh = true;  // a folder of its own making: a report.html that is there is not its own
   bool report = true, json = false, quiet = false;
 };
 
@@ -108,7 +109,7 @@ int carry_out(Course& course) {
   printer.clear();
   // Whatever the page lacks, the run is done and stands in its files.
   bool reported = course.report;
-  if (reported && fs::exists(path / "report.html") && course.from == nullptr) {  // that of a former run is gone by now
+  if (reported && fs::exists(path / "report.html") && course.fresh) {  // that of a former run is gone by now
     reported = false;
     spdlog::warn("{}: is yours and stays; `platen report` writes one elsewhere", (path / "report.html").string());
   }
@@ -130,18 +131,16 @@ int carry_out(Course& course) {
   return outcome.exit_code;
 }
 
-}  // namespace
-
-namespace {
-
 // `platen run --from`: as a new run in its folder, as a resumed one in all else.
 int branch_command(const RunCommand& command) {
-  const fs::path& of = command.from;
-  if (!fs::exists(of / "case.toml") || !fs::exists(of / "series.csv")) throw OutputError(of.string() + ": is not a run folder");
+  const fs::path& of = *command.from;
+  if (of.empty()) throw UsageError("--from: the name of a run folder is missing");
+  for (const char* name : {"case.toml", "series.csv", "results.h5"})
+    if (!fs::exists(of / name)) throw OutputError(fmt::format("{}: is not a run folder with a finished stage, there is no {}", of.string(), name));
+  const UniqueFd unchanged = RunFolder::read_lock(of);
   if (!has_checkpoint(of))
-    throw UsageError(fmt::format("--from: {} has no checkpoint, as runs that came to their end; allowed: a run stopped by --stop-after", of.string()));
+    throw UsageError(fmt::format("--from: {} has no checkpoint, as runs that came to their end; allowed: a run that was told where to stop, by --stop-after", of.string()));
   const Case c = read_case(command.case_file, command.overrides, CaseUse::resume);
-  refuse_unstable_step(c);
   std::string passed_over;
   const Checkpoint from = newest_checkpoint(of, passed_over);
   const CheckpointFacts facts = facts_of(from);
@@ -163,22 +162,24 @@ int branch_command(const RunCommand& command) {
   if (fs::exists(path) && fs::equivalent(path, of)) throw UsageError(fmt::format("--from: {} is the folder of the new run too; allowed: another -o", of.string()));
   catch_stop_signals(command.quiet);
   make_simulation(c, from, 1);  // fails before the folder is touched, if it does
-  const std::string start = RunFolder::create(path, c.text, command.force).start_time();
+  RunFolder made = RunFolder::create(path, c.text, command.force);
+  const std::string start = made.start_time();
+  UniqueFd held = std::move(made).close();
   copy_history(of, from, path, c.text, start);
-  RunFolder folder = RunFolder::reopen(RunFolder::hold(path), path, facts.rows, facts.closed, facts.frames, start);
+  RunFolder folder = RunFolder::reopen(std::move(held), path, facts.rows, facts.closed, facts.frames, start);
   if (!passed_over.empty()) spdlog::warn("{}; going on from the checkpoint before it", passed_over);
   if (!command.quiet)
     spdlog::info("{}: {} spheres, from {} after stage {}, {} of {} stages are left, {} thread{}, into {}", command.case_file.filename().string(), from.bed.id.size(), of.string(),
                  c.stages[facts.stage - 1].name, c.stages.size() - facts.stage, c.stages.size(), options.threads, options.threads == 1 ? "" : "s", path.string());
   folder.log("from", {{"run", of.string()}, {"step", from.bed.step}, {"after", c.stages[facts.stage - 1].name}});
-  Course course{c, folder, options, &from, command.report, command.json, command.quiet};
+  Course course{c, folder, options, &from, true, command.report, command.json, command.quiet};
   return carry_out(course);
 }
 
 }  // namespace
 
 int run_command(const RunCommand& command) {
-  if (!command.from.empty()) return branch_command(command);
+  if (command.from) return branch_command(command);
   // Everything that can be wrong with the request is found before the folder is touched.
   const Case c = read_case(command.case_file, command.overrides);
   refuse_unstable_step(c);
@@ -194,7 +195,7 @@ int run_command(const RunCommand& command) {
   if (!command.quiet)
     spdlog::info("{}: {} spheres, {} stages, {} thread{}, into {}", command.case_file.filename().string(), c.particles.count,
                  c.stages.size(), options.threads, options.threads == 1 ? "" : "s", path.string());
-  Course course{c, folder, options, nullptr, command.report, command.json, command.quiet};
+  Course course{c, folder, options, nullptr, true, command.report, command.json, command.quiet};
   return carry_out(course);
 }
 
@@ -214,6 +215,11 @@ int resume_command(const ResumeCommand& command) {
   if (c.text != from.case_text)
     throw CaseError(fmt::format("{}: is not the case that the run was begun with; put that back (dataset /case of the checkpoint has it), or begin anew with `platen run`", (path / "case.toml").string()));
   const CheckpointFacts facts = facts_of(from);
+  if (!facts.within && facts.stage >= c.stages.size() && all_stages_done(path, c)) {  // kept by --stop-after, for `run --from`
+    if (command.json) print(read_whole_file(path / "summary.json"));
+    else if (!command.quiet) spdlog::info("{}: {}; nothing is left to do", path.string(), run_state(path).text);
+    return exit_done;
+  }
   RunOptions options;
   options.threads = command.threads.value_or(usable_cores());
   options.reproducible = from.reproducible;
@@ -230,7 +236,7 @@ int resume_command(const ResumeCommand& command) {
   if (!command.quiet)
     spdlog::info("{}: {} spheres, on from step {}, {:.4g} s simulated, {} thread{}", path.string(), from.bed.id.size(), from.bed.step,
                  from.bed.time_base + static_cast<double>(from.bed.step - from.bed.step_base) * from.bed.dt, options.threads, options.threads == 1 ? "" : "s");
-  Course course{c, folder, options, &from, command.report, command.json, command.quiet};
+  Course course{c, folder, options, &from, false, command.report, command.json, command.quiet};
   return carry_out(course);
 }
 

@@ -14,7 +14,7 @@ struct RunCommand {
   std::filesystem::path case_file;
   std::filesystem::path folder;         // empty: runs/<stem of the case file>, with the next free number
   std::vector<std::string> overrides;   // --set
-  std::filesystem::path from;           // run folder to begin with instead of the first stage; empty: none
+  std::optional<std::filesystem::path> from;  // run folder to begin with instead of the first stage
   std::optional<int> threads;           // default: usable_cores()
   std::optional<double> max_walltime;   // [s]
   std::string stop_after;               // stage by name, or by number from 1

@@ -208,6 +208,8 @@ TEST(CheckCommand, NotesOnWhatARunWouldShowLate) {
   EXPECT_NE(notes_of({}, quick.substr(0, compress) + quick.substr(unload)).find("unload: nothing has pressed before it"), std::string::npos);
   EXPECT_NE(notes_of({}, quick + quick.substr(compress, unload - compress)).find("compress-2: there are no sides"), std::string::npos);
   EXPECT_FALSE(has("nothing has pressed", {}));
+  EXPECT_FALSE(has("makes overlaps of", {}));
+  EXPECT_TRUE(has("makes overlaps of some", {"stage.compress.until.stress=\"400 kPa\""}));
   EXPECT_FALSE(has("there are no sides", {}));
   // Load steps of one bed have one strain zero.
   const Case steps = parse_case(quick.substr(0, unload) + quick.substr(compress, unload - compress), "case.toml", ".");

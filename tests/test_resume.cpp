@@ -403,6 +403,41 @@ TEST(RunFrom, LaterStagesMayBeOthers) {
   EXPECT_EQ(read_file(root / "branch/case.toml"), read_file(root / "whole/case.toml"));
 }
 
+// The bed's own case may end where it does; a run of it is done and stays so.
+TEST(RunFrom, ABedThatIsAllOfItsCase) {
+  TemporaryFolder root;
+  write_file(root / "bed.toml", small_bed + fill + quick_settle);
+  write_file(root / "case.toml", small_bed + fill + quick_settle + press);
+  const std::string bed = (root / "bed").string(), file = (root / "case.toml").string();
+  ASSERT_EQ(run_program({"run", (root / "bed.toml").string(), "-o", bed, "-q", "--no-report", "--stop-after", "settle"}).exit_code, 0);
+  const ProgramResult again = run_program({"resume", bed, "--no-report"});
+  EXPECT_EQ(again.exit_code, 0) << again.report();
+  EXPECT_TRUE(has(again.err, "nothing is left to do")) << again.err;
+  ASSERT_EQ(run_program({"run", file, "--from", bed, "-o", (root / "branch").string(), "-q", "--no-report"}).exit_code, 0);
+  ASSERT_EQ(run_program({"run", file, "-o", (root / "whole").string(), "-q", "--no-report"}).exit_code, 0);
+  expect_same_run(root / "whole", root / "branch");
+}
+
+// A bed from a particle file, which is not read again, and somebody's own page where the new run goes.
+TEST(RunFrom, NeedsNoParticleFileAndLeavesAForeignReport) {
+  TemporaryFolder root;
+  const std::string spheres = "id,x,y,z,radius,density\n0,0.01,0.01,0.0030,0.0025,2000\n1,0.01,0.01,0.0082,0.0025,2000\n";
+  fs::create_directories(root / "there");
+  write_file(root / "there/spheres.csv", spheres);
+  write_file(root / "there/case.toml", replaced("radius = \"2.5 mm\"\n", "", replaced("density = \"2000 kg/m3\"\n", "", replaced("count = 100\n", "file = \"spheres.csv\"\n", small_bed))) + quick_settle + press);
+  const std::string file = (root / "there/case.toml").string(), bed = (root / "bed").string();
+  const ProgramResult made = run_program({"run", file, "-o", bed, "-q", "--no-report", "--stop-after", "settle"});
+  ASSERT_EQ(made.exit_code, 0) << made.report();
+  ASSERT_EQ(run_program({"run", file, "-o", (root / "whole").string(), "-q", "--no-report"}).exit_code, 0);
+  fs::remove(root / "there/spheres.csv");
+  fs::create_directories(root / "mine");
+  write_file(root / "mine/report.html", "mine");
+  const ProgramResult result = run_program({"run", file, "--from", bed, "-o", (root / "mine").string(), "--force"});
+  ASSERT_EQ(result.exit_code, 0) << result.report();
+  EXPECT_EQ(read_file(root / "mine/report.html"), "mine");
+  EXPECT_EQ(read_file(root / "mine/series.csv"), read_file(root / "whole/series.csv"));
+}
+
 TEST(RunFrom, WhatDoesNotFitIsSaidAndNothingWritten) {
   TemporaryFolder root;
   write_file(root / "case.toml", bed_and_more);
@@ -415,6 +450,8 @@ TEST(RunFrom, WhatDoesNotFitIsSaidAndNothingWritten) {
     int code;
     const char* expected;
   } wrong[] = {
+      {{"--from", ""}, 2, "the name of a run folder is missing"},
+      {{"--from", bed, "--set", "case.seed=7"}, 3, "seed is not as in"},
       {{"--from", bed, "--set", "particles.law.friction=0.1"}, 3, "particles.law is not as in"},
       {{"--from", bed, "--set", "particles.count=90"}, 3, "particles is not as in"},
       {{"--from", bed, "--set", "plates.friction=0.1"}, 3, "plates is not as in"},
@@ -438,6 +475,12 @@ TEST(RunFrom, WhatDoesNotFitIsSaidAndNothingWritten) {
     EXPECT_TRUE(has(result.err, w.expected)) << result.report();
     EXPECT_FALSE(fs::exists(out)) << w.expected;
   }
+  fs::rename(root / "bed/results.h5", root / "elsewhere.h5");
+  const ProgramResult torn = run_program({"run", file, "--from", bed, "-o", out});
+  EXPECT_EQ(torn.exit_code, 5) << torn.report();
+  EXPECT_TRUE(has(torn.err, "there is no results.h5")) << torn.report();
+  EXPECT_FALSE(fs::exists(out));
+  fs::rename(root / "elsewhere.h5", root / "bed/results.h5");
   const ProgramResult same = run_program({"run", file, "--from", bed, "-o", bed, "--force"});
   EXPECT_EQ(same.exit_code, 2) << same.report();
   EXPECT_TRUE(fs::exists(root / "bed/checkpoint.h5"));

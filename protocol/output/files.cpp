@@ -71,6 +71,16 @@ void rename_into_place(const std::filesystem::path& temporary, const std::filesy
   sync_folder(path.parent_path());
 }
 
+void copy_whole_file(const std::filesystem::path& from, const std::filesystem::path& to) {
+  const std::filesystem::path temporary = temporary_name(to);
+  std::filesystem::copy_file(from, temporary, std::filesystem::copy_options::overwrite_existing);
+  {
+    const UniqueFd fd = open_file(temporary, O_RDONLY);
+    if (::fsync(fd.get()) != 0) throw system_error(to, "cannot write", errno);
+  }
+  rename_into_place(temporary, to);
+}
+
 void write_whole_file(const std::filesystem::path& path, std::string_view text) {
   const std::filesystem::path temporary = temporary_name(path);
   UniqueFd fd(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));

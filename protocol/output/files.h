@@ -40,6 +40,9 @@ void rename_into_place(const std::filesystem::path& temporary, const std::filesy
 // or the new one. Throws OutputError; the old file stays then.
 void write_whole_file(const std::filesystem::path& path, std::string_view text);
 
+// A copy of a file, on disk before it returns. Throws OutputError, std::filesystem::filesystem_error.
+void copy_whole_file(const std::filesystem::path& from, const std::filesystem::path& to);
+
 // The whole contents of a file. Throws OutputError.
 std::string read_whole_file(const std::filesystem::path& path);
 

@@ -159,6 +159,12 @@ bool RunFolder::in_use(const fs::path& folder) {
   return fd.get() >= 0 && ::flock(fd.get(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
 }
 
+UniqueFd RunFolder::read_lock(const fs::path& folder) {
+  UniqueFd fd(::open((folder / lock_name).c_str(), O_RDONLY | O_CLOEXEC));
+  if (fd.get() >= 0 && ::flock(fd.get(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK) throw OutputError(folder.string() + ": another process works in this folder");
+  return fd;
+}
+
 RunFolder RunFolder::create(const fs::path& folder, const std::string& case_text, bool force) try {
   fs::create_directories(folder);
   if (force) refuse_to_replace_case(folder, case_text);

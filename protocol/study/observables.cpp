@@ -203,7 +203,7 @@ void measure_compression(const SeriesTable& series, const Case& c, std::optional
   put(out, "porosity_residual", up.porosity.back());
   put(out, "coordination_unloaded", up.coordination.back());
   put(out, "stress_difference_unloaded", quasi_static_difference(up));
-  put(out, "stress_top_unloaded", up.stress_top.back());
+  if (stage_spec(c, first_stage(c, StageKind::unload))->until.stress == 0.0) put(out, "stress_top_unloaded", up.stress_top.back());
 }
 
 // Whether the sample lost its shape when its sides went, and with it the strength that the crush looks for.
@@ -287,7 +287,7 @@ const std::vector<ScalarKind>& scalar_kinds() {
       {"initial_stiffness", "Pa", "largest tangent below half the strength"},
       {"stress_difference", "Pa", "bottom minus top stress, mean of the compression while the inertial number is below 1e-4"},
       {"stress_difference_unloaded", "Pa", "bottom minus top stress, mean of unloading while the inertial number is below 1e-4"},
-      {"stress_top_unloaded", "Pa", "stress on the top plate at the end of unloading"},
+      {"stress_top_unloaded", "Pa", "stress on the top plate at the end of unloading to nothing"},
       {"stress_bottom_released", "Pa", "stress on the bottom plate at rest without sides"},
       {"weight_over_area", "Pa", "weight of the spheres over the plate's area"},
       {"strain_rate", "1/s", "plate speed over the smallest height of the compression"},
