@@ -42,22 +42,36 @@ std::string why_instruction_set() {
   return forced != nullptr && *forced != '\0' ? "forced by PLATEN_ISA" : "the widest that this processor has";
 }
 
+// Asked stage by stage, in order: does this compression's strain go on from an earlier one's zero [plate_stages.cpp]?
+class StrainZero {
+ public:
+  bool goes_on(const StageSpec& s) {
+    if (s.kind == StageKind::vibrate || s.kind == StageKind::release) there_ = false;  // another bed
+    if (s.kind != StageKind::compress) return false;
+    const bool on = there_ && !s.own_strain_zero;
+    there_ = on || !s.until.stress || *s.until.stress >= s.strain_zero;
+    return on;
+  }
+
+ private:
+  bool there_ = false;
+};
+
 void add_inertial_numbers(const Case& c, CheckReport& report) {
   const SphereFacts& f = report.spheres;
   const double area = c.box.width * c.box.depth;
   if (!(area > 0.0)) return;
   const double height = f.solid_volume / (area * (1.0 - dense_porosity));
-  bool pressed = false;  // strain goes on from an earlier compression
+  StrainZero zero;
   for (const StageSpec& s : c.stages) {
-    if (s.kind == StageKind::vibrate || s.kind == StageKind::release) pressed = false;
+    const bool goes_on = zero.goes_on(s);
     if (s.kind != StageKind::compress && s.kind != StageKind::crush) continue;
     const auto add = [&](double stress, const char* of) {
       if (!(stress > 0.0)) return;
       report.inertial.push_back(
           {s.name, stress, of, s.speed / height * 2.0 * f.radius_mean * std::sqrt(f.density / stress)});
     };
-    if (!(s.kind == StageKind::compress && pressed && !s.own_strain_zero)) add(s.strain_zero, "strain zero");
-    pressed = pressed || !s.until.stress || *s.until.stress >= s.strain_zero;
+    if (!goes_on) add(s.strain_zero, "strain zero");
     if (s.until.stress) add(*s.until.stress, "target");
   }
 }
@@ -75,8 +89,10 @@ void add_notes(const Case& c, CheckReport& report) {
     report.notes.push_back("time.step is near dt_limit of a bed without plates; spheres at a plate may have half of it, and a run looks at its own bed");
   if (const PairLaw& law = c.particles.law; law.rolling_friction == 0.0 && (law.f0 != 0.0 || law.k_adh > 0.0))
     report.notes.push_back("rolling_friction = 0 with cohesion: a sphere held between two others may spin on, and a bed take long to come to rest");
-  bool sides = c.box.given && c.box.sides != Sides::open, pressed = false, has_zero = false;
+  bool sides = c.box.given && c.box.sides != Sides::open, pressed = false;
+  StrainZero zero;
   for (const StageSpec& s : c.stages) {
+    const bool goes_on = zero.goes_on(s);
     if (s.kind == StageKind::release) sides = false;
     // Rumpf: a contact of a dense bed carries about pi d^2 sigma / ((1 - porosity) Z); largest overlaps are some five times the mean.
     if (s.kind == StageKind::compress && s.until.stress) {
@@ -91,9 +107,6 @@ void add_notes(const Case& c, CheckReport& report) {
     if (s.kind == StageKind::compress && !sides) report.notes.push_back(s.name + ": there are no sides, so this is no confined compression; `crush` finds the strength of such a bed");
     pressed = pressed || s.kind == StageKind::compress || s.kind == StageKind::crush || s.kind == StageKind::hold || (s.kind == StageKind::fill && s.method == FillMethod::grow);
     if (s.kind == StageKind::crush && sides) report.notes.push_back(s.name + ": the sides are still there: its strength will not be an unconfined one; a stage `release` takes them away");
-    if (s.kind == StageKind::vibrate || s.kind == StageKind::release) has_zero = false;
-    const bool goes_on = s.kind == StageKind::compress && has_zero && !s.own_strain_zero;
-    has_zero = goes_on || (has_zero && s.kind != StageKind::compress) || (s.kind == StageKind::compress && (!s.until.stress || *s.until.stress >= s.strain_zero));
     if (s.kind == StageKind::compress && !goes_on && s.until.stress && *s.until.stress < s.strain_zero)
       report.notes.push_back(fmt::format("{}: ends at {} before strain begins to count at {} (strain_zero)", s.name, pretty(*s.until.stress, "Pa"), pretty(s.strain_zero, "Pa")));
   }
@@ -134,7 +147,6 @@ CheckReport check_report(const Case& c, int threads) {
   report.memory = bytes_of_program + bytes_of_sphere * static_cast<double>(f.count);
 
   // The made-up bed must not blow up, whatever step the user insists on.
-  // Nothing that is said above hangs on it, so it may fail without taking the rest along.
   const EngineSpeed speed = measure_speed(c, f.count, f.equal, std::min(report.dt, 0.2 * first.limits.dt_limit), threads);
   report.scene = speed.scene, report.instruction_set = speed.instruction_set, report.threads = speed.threads;
   report.why_scene = why_scene(c, f.equal), report.why_instruction_set = why_instruction_set();

@@ -73,7 +73,7 @@ std::size_t Experiment::take_up() {
     fields::Reader reader{kept_};
     each_field(reader);
     const auto index = kept_.at("stage").at("index").get<std::size_t>();
-    if (index > c_.stages.size() || (stage_open_ && index == c_.stages.size()) || (stage_open_ && c_.stages[index].name != current_.name)) throw OutputError("the checkpoint does not fit the case: it has other stages");
+    if (index > c_.stages.size() || (stage_open_ && (index == c_.stages.size() || c_.stages[index].name != current_.name))) throw OutputError("the checkpoint does not fit the case: it has other stages");
     wall_begin_ = process_begin_ - wall_seconds_;
     kept_step_ = sim_->step();
     return index;

@@ -131,6 +131,27 @@ int carry_out(Course& course) {
   return outcome.exit_code;
 }
 
+// Options of a run that goes on from a checkpoint. `where` stands in the message on a stage that is over already.
+template <class Command>
+RunOptions options_from(const Checkpoint& from, const CheckpointFacts& facts, const Case& c, const Command& command, const std::string& where) {
+  RunOptions options;
+  options.threads = command.threads.value_or(usable_cores());
+  options.reproducible = from.reproducible;
+  options.max_walltime = command.max_walltime;
+  if (command.stop_after.empty()) return options;
+  options.stop_after = stage_named(c, command.stop_after);
+  for (std::size_t k = 0; k < facts.stage && k < c.stages.size(); ++k)
+    if (c.stages[k].name == options.stop_after)
+      throw UsageError(fmt::format("--stop-after: {} has left stage \"{}\" behind; it goes on with \"{}\"", where, options.stop_after, c.stages[std::min(facts.stage, c.stages.size() - 1)].name));
+  return options;
+}
+
+int say_done(const ResumeCommand& command) {
+  if (command.json) print(read_whole_file(command.folder / "summary.json"));
+  else if (!command.quiet) spdlog::info("{}: {}; nothing is left to do", command.folder.string(), run_state(command.folder).text);
+  return exit_done;
+}
+
 // `platen run --from`: as a new run in its folder, as a resumed one in all else.
 int branch_command(const RunCommand& command) {
   const fs::path& of = *command.from;
@@ -149,15 +170,7 @@ int branch_command(const RunCommand& command) {
                                  of.string(), facts.stage + 1));
   refuse_other_history(c, from, facts.stage, of);
   if (command.reproducible && !from.reproducible) throw UsageError(fmt::format("--reproducible: {} was run without it", of.string()));
-  RunOptions options;
-  options.threads = command.threads.value_or(usable_cores());
-  options.reproducible = from.reproducible;
-  options.max_walltime = command.max_walltime;
-  if (!command.stop_after.empty()) {
-    options.stop_after = stage_named(c, command.stop_after);
-    for (std::size_t k = 0; k < facts.stage; ++k)
-      if (c.stages[k].name == options.stop_after) throw UsageError(fmt::format("--stop-after: {} has left stage \"{}\" behind", of.string(), options.stop_after));
-  }
+  const RunOptions options = options_from(from, facts, c, command, of.string());
   const fs::path path = command.folder.empty() ? free_run_folder(command.case_file) : command.folder;
   if (fs::exists(path) && fs::equivalent(path, of)) throw UsageError(fmt::format("--from: {} is the folder of the new run too; allowed: another -o", of.string()));
   catch_stop_signals(command.quiet);
@@ -205,30 +218,14 @@ int resume_command(const ResumeCommand& command) {
   // In hand before anything is read: whoever is still at work there writes the last checkpoint first.
   UniqueFd held = RunFolder::hold(path);
   const Case c = read_case(path / "case.toml", {}, CaseUse::resume);
-  if (!has_checkpoint(path) && all_stages_done(path, c)) {
-    if (command.json) print(read_whole_file(path / "summary.json"));
-    else if (!command.quiet) spdlog::info("{}: {}; nothing is left to do", path.string(), run_state(path).text);
-    return exit_done;
-  }
+  if (!has_checkpoint(path) && all_stages_done(path, c)) return say_done(command);
   std::string passed_over;
   const Checkpoint from = newest_checkpoint(path, passed_over);
   if (c.text != from.case_text)
     throw CaseError(fmt::format("{}: is not the case that the run was begun with; put that back (dataset /case of the checkpoint has it), or begin anew with `platen run`", (path / "case.toml").string()));
   const CheckpointFacts facts = facts_of(from);
-  if (!facts.within && facts.stage >= c.stages.size() && all_stages_done(path, c)) {  // kept by --stop-after, for `run --from`
-    if (command.json) print(read_whole_file(path / "summary.json"));
-    else if (!command.quiet) spdlog::info("{}: {}; nothing is left to do", path.string(), run_state(path).text);
-    return exit_done;
-  }
-  RunOptions options;
-  options.threads = command.threads.value_or(usable_cores());
-  options.reproducible = from.reproducible;
-  options.max_walltime = command.max_walltime;
-  if (!command.stop_after.empty()) {
-    options.stop_after = stage_named(c, command.stop_after);
-    for (std::size_t k = 0; k < facts.stage && k < c.stages.size(); ++k)
-      if (c.stages[k].name == options.stop_after) throw UsageError(fmt::format("--stop-after: the run has left stage \"{}\" behind; it goes on with \"{}\"", options.stop_after, c.stages[std::min(facts.stage, c.stages.size() - 1)].name));
-  }
+  if (!facts.within && facts.stage >= c.stages.size() && all_stages_done(path, c)) return say_done(command);  // kept by --stop-after, for `run --from`
+  const RunOptions options = options_from(from, facts, c, command, "the run");
   catch_stop_signals(command.quiet);
   make_simulation(c, from, 1);  // fails before the folder is touched, if it does
   RunFolder folder = RunFolder::reopen(std::move(held), path, facts.rows, facts.closed, facts.frames, from.start_time);

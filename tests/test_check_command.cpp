@@ -216,6 +216,19 @@ TEST(CheckCommand, NotesOnWhatARunWouldShowLate) {
   int zeros = 0;
   for (const InertialNumber& i : check_report(steps, 1).inertial) zeros += i.of == "strain zero";
   EXPECT_EQ(zeros, 1);
+  // A second step to the same stress has nothing left to press, a first to half of it half.
+  const auto strokes = [&](const char* first) {
+    Case load = steps;
+    for (StageSpec& s : load.stages) s.start_gap = 0.0;
+    load.stages[2].until.stress = std::atof(first);
+    std::vector<double> out;
+    for (const ExpectedStage& e : expected_stages(load, {0.1, 0.05, 0.42}, 1000, 1e-5, 1e7)) if (e.kind == StageKind::compress) out.push_back(e.simulated);
+    return out;
+  };
+  ASSERT_EQ(strokes("40e3").size(), 2u);
+  EXPECT_DOUBLE_EQ(strokes("40e3")[1], 0.0);
+  EXPECT_NEAR(strokes("20e3")[0], 0.5 * strokes("40e3")[0], 1e-12);
+  EXPECT_GT(strokes("20e3")[1], 0.0);
   EXPECT_FALSE(has("near dt_limit", {"time.step=\"5 us\""}));
   EXPECT_TRUE(has("near dt_limit", {"time.step=\"20 us\""}));
 }
