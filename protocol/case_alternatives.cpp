@@ -2,20 +2,25 @@
 
 #include <array>
 
+#include <fmt/format.h>
+
 #include "protocol/scaling.h"
 
 namespace platen {
 namespace {
 
-// The one radius of the case, or a problem.
-bool one_radius(TableReader& law, std::string_view key, const ParticleSpec& particles, double& R) {
+// The radius that the data are worked out for: the one they name, else the one radius of the case; or a problem.
+bool one_radius(TableReader& law, TableReader& data, std::string_view key, const ParticleSpec& particles, double& R) {
+  if (data.has("radius")) return data.quantity("radius", Quantity::length, positive, Need::required, R);
   R = particles.sizes.radius;
   if (particles.sizes.kind == SizeDistribution::Kind::mono && R > 0.0) return true;
   law.error(key,
-            "is given by material data, which needs particles.radius; allowed: spheres of one radius, or a number (`platen check` "
-            "of the same case with one radius prints it)");
+            "is given by material data, which needs a radius; allowed: spheres of one radius, or `radius` beside the data: the radius that "
+            "the number, which is the same for every pair, is worked out for");
   return false;
 }
+
+std::string where(TableReader& data, double R) { return data.has("radius") ? fmt::format(", R = {:g} mm", 1e3 * R) : ""; }
 
 }  // namespace
 
@@ -34,12 +39,13 @@ bool read_stiffness_alternative(TableReader& law, std::string_view key, const Pa
   if (impact || plane) {
     good &= data.number("poisson_ratio", Range{-1.0, 0.5, false, true}, Need::required, nu);
   }
+  const bool sized = one_radius(law, data, key, particles, R);
   data.refuse_unknown("a stiffness by material data");
   if (exponent != 1.0) {
     law.error(key, "is given by material data, which needs exponent 1; allowed: a plain number in N/m^n");
     return false;
   }
-  if (!one_radius(law, key, particles, R) || !good) return false;
+  if (!sized || !good) return false;
   if (impact && !(particles.density > 0.0)) {
     law.error(key,
               "is given by an impact speed, which needs particles.density; allowed: leave impact_speed out");
@@ -51,6 +57,7 @@ bool read_stiffness_alternative(TableReader& law, std::string_view key, const Pa
   formula = impact  ? "16/15 sqrt(R*) E* (15 m* V^2 / (16 sqrt(R*) E*))^(1/5) [Thakur2016, Eq. 12, 13]"
             : plane ? "2 E* R* [Thakur2016, Eq. 14]"
                     : "pi R E / 2 [Thakur2016, Eq. 15]";
+  formula += where(data, R);
   return true;
 }
 
@@ -60,7 +67,7 @@ bool read_f0_alternative(TableReader& law, std::string_view key, const ParticleS
   int given = 0;
   for (const char* source : sources) given += data.has(source) ? 1 : 0;
   double R = 0.0;
-  bool good = one_radius(law, key, particles, R);
+  bool good = one_radius(law, data, key, particles, R);
   if (given != 1) {
     law.error(
         key,
@@ -103,6 +110,7 @@ bool read_f0_alternative(TableReader& law, std::string_view key, const ParticleS
     if (good) out = f0_of_bond_number(R, Bo, particles.density, gravity);
     formula = "-Bo 4/3 pi R^3 rho g [Thakur2016, Eq. 22]";
   }
+  formula += where(data, R);
   data.refuse_unknown("f0 by material data");
   return good;
 }

@@ -37,6 +37,11 @@ double SizeDistribution::largest() const {
       }
       return R;
     }
+    case Kind::cumulative: {
+      std::size_t i = radii.size() - 1;
+      while (i > 1 && !(below[i] > below[i - 1])) --i;  // nothing is made where the curve is flat
+      return radii[i];
+    }
     default:
       return max;
   }
@@ -52,6 +57,11 @@ double SizeDistribution::smallest() const {
         if (i >= weights.size() || weights[i] > 0.0) R = std::min(R, radii[i]);
       }
       return R;
+    }
+    case Kind::cumulative: {
+      std::size_t i = 0;
+      while (i + 2 < radii.size() && !(below[i + 1] > below[i])) ++i;
+      return radii[i];
     }
     default:
       return min;

@@ -16,14 +16,17 @@ namespace platen {
 enum class Sides { periodic, walls, open };
 
 struct SizeDistribution {
-  enum class Kind { mono, lognormal, normal, uniform, list };
+  enum class Kind { mono, lognormal, normal, uniform, list, cumulative };
+  enum class Basis { number, volume };
   Kind kind = Kind::mono;
+  Basis basis = Basis::number;  // what the distribution is one of: how many spheres, or how much of the solid
   double radius = 0.0;          // mono [m]
   double median = 0.0;          // lognormal: median; normal: mean [m]
   double sigma = 0.0;           // lognormal: of ln R [-]; normal: of R [m]
   double min = 0.0, max = 0.0;  // truncation (uniform: the range) [m]
-  std::vector<double> radii;    // list [m]
-  std::vector<double> weights;  // list: relative numbers, same length as radii; empty = equal
+  std::vector<double> radii;    // list; cumulative, ascending [m]
+  std::vector<double> weights;  // list: relative numbers or volumes, same length as radii; empty = equal
+  std::vector<double> below;    // cumulative: what part is below each of the radii; straight in between [-]
   double largest() const;       // largest radius that can occur [m]
   double smallest() const;      // smallest radius that can occur [m]
   bool operator==(const SizeDistribution&) const = default;

@@ -45,6 +45,7 @@ inline constexpr Range not_negative{0.0, infinite, true, false};
 inline constexpr Range not_positive{-infinite, 0.0, false, true};
 inline constexpr Range fraction{0.0, 1.0, false, false};    // (0, 1)
 inline constexpr Range proper_part{0.0, 1.0, false, true};  // (0, 1]
+inline constexpr Range part_or_all{0.0, 1.0, true, true};   // [0, 1]
 
 enum class Need { optional, required };
 

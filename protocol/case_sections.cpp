@@ -1,6 +1,8 @@
 #include "protocol/case_sections.h"
 
+#include <algorithm>
 #include <array>
+#include <functional>
 #include <numeric>
 
 #include <fmt/format.h>
@@ -12,49 +14,74 @@ namespace {
 
 constexpr std::int64_t largest_integer = std::numeric_limits<std::int64_t>::max();
 
-bool read_sizes(TableReader& sizes, SizeDistribution& out) {
-  const std::vector<std::string> kinds{"lognormal", "normal", "uniform", "list"};
-  std::size_t kind = 0;
-  if (!sizes.word("kind", kinds, Need::required, kind)) return false;
-  bool good = true;
-  if (kind == 3) {
-    out.kind = SizeDistribution::Kind::list;
-    good = sizes.quantities("radii", Quantity::length, positive, Need::required, out.radii);
-    const bool weighted = sizes.has("weights");
-    const bool weights_good = weighted && sizes.numbers("weights", not_negative, Need::optional, out.weights);
-    if (good && weights_good && out.weights.size() != out.radii.size()) {
-      sizes.error("weights", fmt::format("has {} entries for {} radii; allowed: one weight for each radius",
-                                         out.weights.size(), out.radii.size()));
-    } else if (weights_good && !(std::accumulate(out.weights.begin(), out.weights.end(), 0.0) > 0.0)) {
-      sizes.error("weights", "are all 0; allowed: at least one weight > 0");
-    }
-  } else {
-    const bool low = sizes.quantity("min", Quantity::length, positive, Need::required, out.min);
-    const bool high = sizes.quantity("max", Quantity::length, positive, Need::required, out.max);
-    good = low && high;
-    if (good && !(out.min < out.max)) {
-      sizes.error("min", "is not below max; allowed: min < max");
-      good = false;
-    }
-    std::string centre = "median";
-    bool centre_good = false;
-    if (kind == 0) {
-      out.kind = SizeDistribution::Kind::lognormal;
-      centre_good = sizes.quantity("median", Quantity::length, positive, Need::required, out.median);
-      sizes.number("sigma", positive, Need::required, out.sigma);
-    } else if (kind == 1) {
-      out.kind = SizeDistribution::Kind::normal;
-      if (!sizes.has("median")) centre = "mean";  // the median of a normal distribution is its mean: both words do
-      if (centre == "median" && sizes.has("mean")) sizes.error("mean", "is given beside median; allowed: one of them");
-      centre_good = sizes.quantity(centre, Quantity::length, positive, Need::required, out.median);
-      sizes.quantity("sigma", Quantity::length, positive, Need::required, out.sigma);
-    } else {
-      out.kind = SizeDistribution::Kind::uniform;
-    }
-    if (good && centre_good && (out.median < out.min || out.median > out.max)) {
-      sizes.error(centre, fmt::format("is not between min and max; allowed: min <= {} <= max", centre));
-    }
+bool read_list(TableReader& sizes, SizeDistribution& out) {
+  out.kind = SizeDistribution::Kind::list;
+  const bool good = sizes.quantities("radii", Quantity::length, positive, Need::required, out.radii);
+  const bool weighted = sizes.has("weights");
+  const bool weights_good = weighted && sizes.numbers("weights", not_negative, Need::optional, out.weights);
+  if (good && weights_good && out.weights.size() != out.radii.size()) {
+    sizes.error("weights", fmt::format("has {} entries for {} radii; allowed: one weight for each radius", out.weights.size(), out.radii.size()));
+  } else if (weights_good && !(std::accumulate(out.weights.begin(), out.weights.end(), 0.0) > 0.0)) {
+    sizes.error("weights", "are all 0; allowed: at least one weight > 0");
   }
+  return good;
+}
+
+bool read_cumulative(TableReader& sizes, SizeDistribution& out) {
+  out.kind = SizeDistribution::Kind::cumulative;
+  const bool radii = sizes.quantities("radii", Quantity::length, positive, Need::required, out.radii);
+  const bool below = sizes.numbers("below", part_or_all, Need::required, out.below);
+  if (!radii || !below) return false;
+  if (out.radii.size() < 2) {
+    sizes.error("radii", fmt::format("has {} entries; allowed: two or more", out.radii.size()));
+  } else if (out.below.size() != out.radii.size()) {
+    sizes.error("below", fmt::format("has {} entries for {} radii; allowed: one part for each radius", out.below.size(), out.radii.size()));
+  } else if (std::ranges::adjacent_find(out.radii, std::greater_equal{}) != out.radii.end()) {
+    sizes.error("radii", "do not ascend; allowed: each larger than the one before");
+  } else if (std::ranges::adjacent_find(out.below, std::greater{}) != out.below.end() || !(out.below.back() > out.below.front())) {
+    sizes.error("below", "does not rise; allowed: parts from 0 to 1, none smaller than the one before, the last larger than the first");
+  } else {
+    return true;
+  }
+  return false;
+}
+
+bool read_range(TableReader& sizes, SizeDistribution::Kind kind, SizeDistribution& out) {
+  out.kind = kind;
+  const bool low = sizes.quantity("min", Quantity::length, positive, Need::required, out.min);
+  const bool high = sizes.quantity("max", Quantity::length, positive, Need::required, out.max);
+  bool good = low && high;
+  if (good && !(out.min < out.max)) {
+    sizes.error("min", "is not below max; allowed: min < max");
+    good = false;
+  }
+  if (kind == SizeDistribution::Kind::uniform) return good;
+  const bool log = kind == SizeDistribution::Kind::lognormal;
+  std::string centre = "median";
+  if (!log && !sizes.has("median")) centre = "mean";  // the median of a normal distribution is its mean: both words do
+  if (!log && centre == "median" && sizes.has("mean")) sizes.error("mean", "is given beside median; allowed: one of them");
+  const bool centre_good = sizes.quantity(centre, Quantity::length, positive, Need::required, out.median);
+  if (log)
+    sizes.number("sigma", positive, Need::required, out.sigma);
+  else
+    sizes.quantity("sigma", Quantity::length, positive, Need::required, out.sigma);
+  if (good && centre_good && (out.median < out.min || out.median > out.max)) {
+    sizes.error(centre, fmt::format("is not between min and max; allowed: min <= {} <= max", centre));
+  }
+  return good;
+}
+
+bool read_sizes(TableReader& sizes, SizeDistribution& out) {
+  using Kind = SizeDistribution::Kind;
+  const std::vector<std::string> kinds{"lognormal", "normal", "uniform", "list", "cumulative"};
+  const std::array of{Kind::lognormal, Kind::normal, Kind::uniform, Kind::list, Kind::cumulative};
+  std::size_t kind = 0, basis = 0;
+  if (!sizes.word("kind", kinds, Need::required, kind)) return false;
+  sizes.word("basis", {"number", "volume"}, Need::optional, basis);
+  out.basis = basis == 0 ? SizeDistribution::Basis::number : SizeDistribution::Basis::volume;
+  const bool good = of[kind] == Kind::list         ? read_list(sizes, out)
+                    : of[kind] == Kind::cumulative ? read_cumulative(sizes, out)
+                                                   : read_range(sizes, of[kind], out);
   sizes.refuse_unknown(fmt::format("sizes of kind \"{}\"", kinds[kind]));
   return good;
 }

@@ -165,6 +165,9 @@ std::string check_text(const Case& c, const CheckReport& r) {
                      ? fmt::format("{}, radius {:g} mm", f.count, 1e3 * f.radius_min)
                      : fmt::format("{}, radii {:.4g} to {:.4g} mm, mean {:.4g} mm", f.count, 1e3 * f.radius_min,
                                    1e3 * f.radius_max, 1e3 * f.radius_mean));
+  if (f.volume_radii)
+    row("", fmt::format("10, 50, 90 % of the volume below {:.4g}, {:.4g}, {:.4g} mm", 1e3 * (*f.volume_radii)[0], 1e3 * (*f.volume_radii)[1],
+                        1e3 * (*f.volume_radii)[2]));
   row("mass", f.mass_min == f.mass_max
                   ? fmt::format("{:.4g} kg together, {:.4g} kg each", f.mass_total, f.mass_min)
                   : fmt::format("{:.4g} kg together, {:.4g} to {:.4g} kg each", f.mass_total, f.mass_min, f.mass_max));
@@ -203,6 +206,7 @@ std::string check_json(const Case& c, const CheckReport& r) {
   json["particles"] = {{"count", f.count},           {"radius_min", f.radius_min}, {"radius_max", f.radius_max},
                        {"radius_mean", f.radius_mean}, {"density", f.density},     {"mass_min", f.mass_min},
                        {"mass_max", f.mass_max},     {"mass_total", f.mass_total}, {"solid_volume", f.solid_volume}};
+  if (f.volume_radii) json["particles"]["volume_radii"] = *f.volume_radii;
   json["time_step"] = {{"dt", r.dt}, {"dt_crit", r.limits.dt_crit}, {"dt_limit", r.limits.dt_limit}, {"rule", r.rule}};
   if (r.settled_height) json["settled_bed"] = {{"height", *r.settled_height}, {"porosity", *r.settled_porosity}};
   const PairLaw& law = c.particles.law;

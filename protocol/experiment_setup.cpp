@@ -8,7 +8,7 @@
 #include "protocol/experiment.h"
 #include "protocol/stages/grow.h"
 #include "protocol/stages/rain.h"
-#include "protocol/stages/random_source.h"
+#include "protocol/stages/draw_radii.h"
 
 namespace platen {
 

@@ -31,7 +31,7 @@ void set(std::vector<std::string>& out, const char* key, double value) {
 void scale_sizes(const SizeDistribution& sizes, double lambda, std::vector<std::string>& out) {
   using Kind = SizeDistribution::Kind;
   if (sizes.kind == Kind::mono) return set(out, "particles.radius", sizes.radius * lambda);
-  if (sizes.kind == Kind::list) {
+  if (sizes.kind == Kind::list || sizes.kind == Kind::cumulative) {
     std::string radii;
     for (const double R : sizes.radii) radii += (radii.empty() ? "" : ", ") + toml_number(R * lambda);
     out.push_back("particles.sizes.radii=[" + radii + "]");
@@ -43,8 +43,8 @@ void scale_sizes(const SizeDistribution& sizes, double lambda, std::vector<std::
   if (sizes.kind == Kind::normal) {
     // The case may call it mean or median: the whole table in one go.
     out.resize(out.size() - 2);
-    out.push_back(fmt::format("particles.sizes={{ kind = \"normal\", mean = {}, sigma = {}, min = {}, max = {} }}",
-                              toml_number(sizes.median * lambda), toml_number(sizes.sigma * lambda),
+    out.push_back(fmt::format("particles.sizes={{ kind = \"normal\", basis = \"{}\", mean = {}, sigma = {}, min = {}, max = {} }}",
+                              sizes.basis == SizeDistribution::Basis::volume ? "volume" : "number", toml_number(sizes.median * lambda), toml_number(sizes.sigma * lambda),
                               toml_number(sizes.min * lambda), toml_number(sizes.max * lambda)));
   }
 }

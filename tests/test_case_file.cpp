@@ -102,6 +102,11 @@ TEST(CaseFile, SizeDistributions) {
   s = with(R"({ kind = "list", radii = ["1 mm", 0.002, "3 mm"], weights = [1, 2.5, 0] })");
   EXPECT_EQ(s.largest(), 2e-3) << "a weight of 0 never occurs";
   EXPECT_EQ(s.smallest(), 1e-3);
+  EXPECT_EQ(s.basis, SizeDistribution::Basis::number);
+  s = with(R"({ kind = "cumulative", basis = "volume", radii = ["1 mm", "2 mm", "4 mm"], below = [0, 0.5, 1] })");
+  EXPECT_EQ(s.basis, SizeDistribution::Basis::volume);
+  EXPECT_EQ(s.smallest(), 1e-3);
+  EXPECT_EQ(s.largest(), 4e-3);
 }
 
 TEST(CaseFile, BadSizeDistributions) {
@@ -120,6 +125,13 @@ TEST(CaseFile, BadSizeDistributions) {
   refused(R"({ kind = "list", radii = ["1 mm", "2 mm"], weights = [1] })", "weights", "one weight for each radius");
   refused(R"({ kind = "list", radii = ["1 mm"], weights = [0] })", "weights", "at least one weight > 0");
   refused(R"({ kind = "list", radii = [] })", "radii", "is empty");
+  refused(R"({ kind = "uniform", basis = "mass", min = "1 mm", max = "2 mm" })", "basis", "allowed: \"number\", \"volume\"");
+  refused(R"({ kind = "cumulative", radii = ["1 mm", "1 mm"], below = [0, 1] })", "radii", "each larger than the one before");
+  refused(R"({ kind = "cumulative", radii = ["1 mm", "2 mm"], below = [1, 0] })", "below", "none smaller than the one before");
+  refused(R"({ kind = "cumulative", radii = ["1 mm", "2 mm"], below = [0.5, 0.5] })", "below", "larger than the first");
+  refused(R"({ kind = "cumulative", radii = ["1 mm", "2 mm"], below = [0, 50] })", "below", "[0, 1]");
+  refused(R"({ kind = "cumulative", radii = ["1 mm", "2 mm"], below = [1] })", "below", "one part for each radius");
+  refused(R"({ kind = "cumulative", radii = ["1 mm"], below = [1] })", "radii", "two or more");
 }
 
 TEST(CaseFile, UnknownKeyNamesTheNearest) {

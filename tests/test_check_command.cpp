@@ -1,4 +1,5 @@
 // `platen check`: derived values against their formulas, the expected time, the two forms of output.
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -37,6 +38,9 @@ TEST(CheckCommand, DistributedSpheres) {
   EXPECT_NEAR(f.radius_mean, 2.5e-3, 8e-6);
   EXPECT_NEAR(f.solid_volume / (20000.0 * pi / 3.0 * (81.0 - 16.0) * 1e-9), 1.0, 0.012) << "4/3 pi <R^3>";
   EXPECT_DOUBLE_EQ(f.mass_max, mass(f.radius_max));
+  // Of the volume (R^4 - 2^4) / (3^4 - 2^4) is below R, in mm.
+  ASSERT_TRUE(f.volume_radii);
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR((*f.volume_radii)[static_cast<std::size_t>(k)], 1e-3 * std::pow(16.0 + std::array{0.1, 0.5, 0.9}[static_cast<std::size_t>(k)] * 65.0, 0.25), 2e-5) << k;
 }
 
 TEST(CheckCommand, DimensionlessNumbers) {

@@ -9,7 +9,7 @@
 
 #include "protocol/stages/grow.h"
 #include "protocol/stages/rain.h"
-#include "protocol/stages/random_source.h"
+#include "protocol/stages/draw_radii.h"
 
 namespace platen {
 namespace {
@@ -183,6 +183,76 @@ TEST(Radii, ListByWeight) {
   int first = 0;
   for (const double R : draw_radii(sizes, N, random)) first += R == 1e-3;
   EXPECT_NEAR(first, N / 4.0, 5.0 * std::sqrt(N * 0.1875));
+}
+
+// Part of the solid in spheres below R, of N drawn.
+double volume_below(const std::vector<double>& radii, double R) {
+  double below = 0.0, all = 0.0;
+  for (const double r : radii) all += r * r * r, below += r <= R ? r * r * r : 0.0;
+  return below / all;
+}
+
+TEST(Radii, DistributionsOfVolume) {
+  const int N = 400000;
+  const auto drawn = [&](const SizeDistribution& sizes) {
+    RandomSource random(5);
+    return draw_radii(sizes, N, random);
+  };
+  SizeDistribution sizes;
+  sizes.basis = SizeDistribution::Basis::volume;
+  sizes.kind = Kind::uniform;
+  sizes.min = 1e-3, sizes.max = 3e-3;
+  std::vector<double> radii = drawn(sizes);
+  EXPECT_GE(*std::min_element(radii.begin(), radii.end()), sizes.min);
+  EXPECT_LE(*std::max_element(radii.begin(), radii.end()), sizes.max);
+  for (const double R : {1.2e-3, 1.6e-3, 2e-3, 2.6e-3}) EXPECT_NEAR(volume_below(radii, R), (R - 1e-3) / 2e-3, 5e-3) << R;
+  // p_0 ~ R^-3: of the number (1 - 1/4)/(1 - 1/9) is below 2 mm
+  EXPECT_NEAR(std::ranges::count_if(radii, [](double R) { return R < 2e-3; }) / double(N), 27.0 / 32.0, 3e-3);
+
+  // Cut at one deviation on both sides: symmetric in ln R, or in R, by volume.
+  const auto below = [](double z) { return 0.5 + 0.5 * std::erf(z / std::sqrt(2.0)) / std::erf(1.0 / std::sqrt(2.0)); };
+  sizes.kind = Kind::lognormal;
+  sizes.median = 2e-3, sizes.sigma = 0.4;
+  sizes.min = 2e-3 * std::exp(-0.4), sizes.max = 2e-3 * std::exp(0.4);
+  radii = drawn(sizes);
+  for (const double z : {-0.5, 0.0, 0.5}) EXPECT_NEAR(volume_below(radii, 2e-3 * std::exp(0.4 * z)), below(z), 5e-3) << z;
+  sizes.kind = Kind::normal;
+  sizes.sigma = 0.8e-3;
+  sizes.min = 1.2e-3, sizes.max = 2.8e-3;
+  radii = drawn(sizes);
+  for (const double z : {-0.5, 0.0, 0.5}) EXPECT_NEAR(volume_below(radii, 2e-3 + 0.8e-3 * z), below(z), 5e-3) << z;
+
+  sizes.kind = Kind::list;
+  sizes.radii = {1e-3, 2e-3, 4e-3};
+  sizes.weights = {1.0, 2.0, 1.0};
+  radii = drawn(sizes);
+  EXPECT_NEAR(volume_below(radii, 1e-3), 0.25, 5e-3);
+  EXPECT_NEAR(volume_below(radii, 2e-3), 0.75, 5e-3);
+  EXPECT_NEAR(std::ranges::count(radii, 1e-3) / double(N), 1.0 / (1.0 + 2.0 / 8.0 + 1.0 / 64.0), 3e-3);
+}
+
+TEST(Radii, CumulativeDistributions) {
+  const int N = 400000;
+  SizeDistribution sizes;
+  sizes.kind = Kind::cumulative;
+  sizes.radii = {0.5e-3, 1e-3, 2e-3, 2.5e-3, 4e-3, 5e-3};
+  sizes.below = {0.2, 0.2, 0.5, 0.7, 1.0, 1.0};  // what is below the first is not made: 0 to 1 of the rest is (b - 0.2) / 0.8
+  EXPECT_EQ(sizes.smallest(), 1e-3);
+  EXPECT_EQ(sizes.largest(), 4e-3);
+  for (const auto basis : {SizeDistribution::Basis::number, SizeDistribution::Basis::volume}) {
+    sizes.basis = basis;
+    RandomSource random(6);
+    const std::vector<double> radii = draw_radii(sizes, N, random);
+    EXPECT_GE(*std::min_element(radii.begin(), radii.end()), 1e-3);
+    EXPECT_LE(*std::max_element(radii.begin(), radii.end()), 4e-3);
+    for (const auto& [R, expected] : {std::pair{1.5e-3, 0.1875}, {2e-3, 0.375}, {2.5e-3, 0.625}, {3.25e-3, 0.8125}}) {
+      const double number = std::ranges::count_if(radii, [&](double r) { return r <= R; }) / double(N);
+      EXPECT_NEAR(basis == SizeDistribution::Basis::number ? number : volume_below(radii, R), expected, 5e-3) << R;
+    }
+  }
+  RandomSource random(7);
+  sizes.below.pop_back();
+  EXPECT_THROW(draw_radii(sizes, 1, random), std::invalid_argument);
 }
 
 TEST(Radii, RefuseWhatCannotBeDrawn) {

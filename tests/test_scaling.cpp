@@ -132,6 +132,20 @@ TEST(Scaling, SizeDistributionsAreStretched) {
   EXPECT_EQ(c.particles.sizes.max, 0.008);
 }
 
+TEST(Scaling, DistributionsOfVolumeStaySo) {
+  std::string text = base_text;
+  text.replace(text.find("radius = \"2.5 mm\"\n"), 18, "");
+  for (const std::string sizes : {"kind = \"normal\", mean = 0.003, sigma = 0.0005, min = 0.002, max = 0.004", "kind = \"uniform\", min = 0.002, max = 0.004",
+                                  "kind = \"list\", radii = [0.002, 0.004]", "kind = \"cumulative\", radii = [0.002, 0.004], below = [0, 1]"}) {
+    std::vector<std::string> all{"particles.sizes={ basis = \"volume\", " + sizes + " }"};
+    for (const std::string& change : scaling_overrides(parse_case(text, "base.toml", {}, all), {}, 2.0)) all.push_back(change);
+    const SizeDistribution scaled = parse_case(text, "base.toml", {}, all).particles.sizes;
+    EXPECT_EQ(scaled.basis, SizeDistribution::Basis::volume) << sizes;
+    EXPECT_EQ(scaled.smallest(), 0.004) << sizes;
+    EXPECT_EQ(scaled.largest(), 0.008) << sizes;
+  }
+}
+
 // The spring that stores the energy of a Hertz impact: both sides computed from the closed form of the largest overlap.
 TEST(Scaling, ImpactStiffnessStoresTheEnergyOfHertz) {
   const double R = 2.5e-3, rho = 2000.0, E = 7e7, nu = 0.3, V = 0.3;
@@ -184,6 +198,16 @@ TEST(Scaling, CasesByMaterialData) {
   // Gravity counts wherever it stands in the file.
   EXPECT_TRUE(same(base_case({"particles.law.f0={ bond_number = 300 }", "environment.gravity=\"4.905 m/s2\""}).particles.law.f0,
                    -300.0 * 4.0 / 3.0 * pi * std::pow(2.5e-3, 3) * 2000.0 * 4.905));
+  // Unequal spheres: at the radius that the data name.
+  const std::string sizes = "particles.sizes={ kind = \"uniform\", min = \"2 mm\", max = \"3 mm\" }";
+  std::string no_radius = base_text;
+  no_radius.erase(no_radius.find("radius ="), std::string("radius = \"2.5 mm\"").size());
+  const Case unequal = parse_case(no_radius, "base.toml", {},
+                                  {sizes, "particles.law.k1={ young_modulus = \"0.7 MPa\", radius = \"2.2 mm\" }",
+                                   "particles.law.f0={ surface_energy = 0.05, model = \"jkr\", radius = \"2.4 mm\" }"});
+  EXPECT_TRUE(same(unequal.particles.law.k1, stiffness_of_modulus(2.2e-3, 7e5)));
+  EXPECT_TRUE(same(unequal.particles.law.f0, f0_of_surface_energy(2.4e-3, 0.05, AdhesionModel::jkr)));
+  EXPECT_NE(unequal.particles.law_origins.front().second.find("R = 2.2 mm"), std::string::npos);
   // Scaled, they are the reference's numbers times the power, not worked out anew: f0 kept here, not ~ R.
   std::vector<std::string> changes{"particles.law.f0={ surface_energy = 0.05, model = \"dmt\" }"};
   const Case reference = base_case(changes);

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
 
+#include "protocol/stages/draw_radii.h"
 #include "protocol/stages/grow.h"
 
 namespace platen {

@@ -9,10 +9,6 @@
 
 #include <cmath>
 #include <cstdint>
-#include <stdexcept>
-#include <vector>
-
-#include "protocol/case_file.h"
 
 namespace platen {
 
@@ -78,51 +74,5 @@ class RandomSource {
   static std::uint64_t rotated(std::uint64_t x, int by) { return (x << by) | (x >> (64 - by)); }
   std::uint64_t state_[4];
 };
-
-// One radius [m]. Truncated distributions are drawn by rejection; throws std::invalid_argument where the range holds so
-// little of the distribution that a million draws miss it, and where a list has no positive weight.
-inline double draw_radius(const SizeDistribution& sizes, RandomSource& random) {
-  using Kind = SizeDistribution::Kind;
-  switch (sizes.kind) {
-    case Kind::mono:
-      return sizes.radius;
-    case Kind::uniform:
-      return sizes.min + (sizes.max - sizes.min) * random.uniform();
-    case Kind::lognormal:
-    case Kind::normal:
-      for (int attempt = 0; attempt < 1000000; ++attempt) {
-        const double deviate = sizes.sigma * random.normal();
-        const double R = sizes.kind == Kind::normal ? sizes.median + deviate : sizes.median * portable_exp(deviate);
-        // A largest radius of 0 stands for none.
-        if (R > 0.0 && R >= sizes.min && (sizes.max <= 0.0 || R <= sizes.max)) return R;
-      }
-      throw std::invalid_argument("particles.sizes: almost nothing of the distribution lies between min and max");
-    case Kind::list: {
-      const std::size_t count = sizes.radii.size();
-      if (count == 0 || (!sizes.weights.empty() && sizes.weights.size() != count))
-        throw std::invalid_argument("particles.sizes: a list needs radii, and as many weights or none");
-      double total = 0.0;
-      for (std::size_t k = 0; k < count; ++k) total += sizes.weights.empty() ? 1.0 : sizes.weights[k];
-      if (!(total > 0.0)) throw std::invalid_argument("particles.sizes: no positive weight in the list");
-      double left = total * random.uniform();
-      std::size_t last = 0;  // with a weight, for a remainder that rounding has left at the end
-      for (std::size_t k = 0; k < count; ++k) {
-        const double weight = sizes.weights.empty() ? 1.0 : sizes.weights[k];
-        if (weight > 0.0) last = k;
-        if (left < weight) return sizes.radii[k];
-        left -= weight;
-      }
-      return sizes.radii[last];
-    }
-  }
-  throw std::invalid_argument("particles.sizes: unknown kind");
-}
-
-// `count` radii [m] in order of ids; throws as draw_radius does.
-inline std::vector<double> draw_radii(const SizeDistribution& sizes, std::int64_t count, RandomSource& random) {
-  std::vector<double> radii(static_cast<std::size_t>(count));
-  for (double& R : radii) R = draw_radius(sizes, random);
-  return radii;
-}
 
 }  // namespace platen
