@@ -117,6 +117,39 @@ TEST(Judge, TakesAnUnscaledBedWithKeysOfItsOwnWhereThereIsNoPlainOne) {
   EXPECT_EQ(holds(false, false, 1.5), std::nullopt) << "none at all";
 }
 
+// One curve of three lost a seed: that is said beside what it is in, and nowhere else.
+TEST(Judge, SeedsAreThoseOfTheCurvesThatAStatementIsOn) {
+  Study study;
+  PlannedPart planned;
+  planned.study = &study, planned.reference_radius = 2e-3;
+  PartResults part;
+  part.plan = &planned;
+  const std::map<std::string, std::vector<std::uint64_t>> seeds{{"a reference", {1, 2, 3}}, {"b whole", {1, 2, 3}}, {"c lost one", {2, 3}}, {"d lost all", {}}};
+  for (const auto& [name, own] : seeds) {
+    CurveSpec spec;
+    spec.name = name, spec.set = {"particles.law.friction=0.3"};
+    study.curves.push_back(spec);
+    PlannedCurve curve;
+    curve.label = curve.block = name, curve.radius = 2e-3;
+    planned.curves.push_back(curve);
+  }
+  for (const PlannedCurve& curve : planned.curves) {
+    MeasuredCurve measured;
+    measured.planned = &curve, measured.seeds = seeds.at(curve.label);
+    for (std::size_t k = 0; k < measured.seeds.size(); ++k) {
+      RunMeasures run;
+      run.scalars = {{"strain_peak", 0.1}, {"strength", 1e4}};
+      measured.runs.push_back(run);
+    }
+    part.curves.push_back(measured);
+  }
+  std::vector<Statement> said;
+  Judge judge(part, said);
+  judge_like_reference(judge);
+  ASSERT_EQ(said.size(), 6u);
+  for (const Statement& s : said) EXPECT_EQ(s.seeds, s.text.starts_with("b") ? 3 : s.text.starts_with("c") ? 2 : 0) << s.text;
+}
+
 // What changes of a bed of half the plate speed, with three seeds each: by how much, with its standard error, against the scatter.
 TEST(Judge, ChangesStandBesideTheirOwnErrorAndTheScatter) {
   Study study;

@@ -184,6 +184,13 @@ TEST(StudyPlan, ProductOfRadiiPowersAndKeys) {
   EXPECT_EQ(part.curves.back().label, "coarse R=3 mm b=3 friction=0.5");
 }
 
+TEST(StudyPlan, ACurveNamedAfterItsKeySaysItOnce) {
+  const StudyFolder folder(replaced("name = \"coarse\"\nradius = \"3 mm\"\nstiffness = [0, 1, 2]",
+                                    "name = \"friction\"\nvary = { \"particles.law.friction\" = [0.3, 0.4] }", without_scan), base_text);
+  const StudyPlan plan = make_plan(read_study(folder.file(), {}));
+  EXPECT_EQ(plan.parts.at(0).curves.back().label, "friction=0.4");
+}
+
 TEST(StudyPlan, LongNamesAreCutAndStayTheirCases) {
   const auto names = [](const std::string& keys) {
     const StudyFolder folder(replaced("radius = \"3 mm\"\nstiffness = [0, 1, 2]", "radius = \"3 mm\"\n" + keys, without_scan), base_text);

@@ -112,13 +112,16 @@ void Judge::number(const std::string& figure, const std::string& text, Estimate 
 
 void Judge::say(const std::string& figure, const std::string& text, const std::string& number,
                 std::optional<bool> holds) {
-  std::size_t seeds = 0;  // of the curve that has fewest
-  for (const MeasuredCurve& curve : part_.curves)
-    if (!curve.runs.empty()) {
-      const std::size_t own = std::set(curve.seeds.begin(), curve.seeds.end()).size();
-      seeds = seeds == 0 ? own : std::min(seeds, own);
-    }
-  out_->push_back({part_.plan->study->name, figure, text, number, holds, static_cast<int>(seeds)});
+  std::optional<std::size_t> seeds;  // of the curve that has fewest
+  const auto count = [&](const MeasuredCurve& curve) {
+    const std::size_t own = std::set(curve.seeds.begin(), curve.seeds.end()).size();
+    seeds = seeds ? std::min(*seeds, own) : own;
+  };
+  for (const MeasuredCurve* curve : curves_) count(*curve);
+  if (curves_.empty())
+    for (const MeasuredCurve& curve : part_.curves)
+      if (!curve.runs.empty()) count(curve);
+  out_->push_back({part_.plan->study->name, figure, text, number, holds, static_cast<int>(seeds.value_or(0))});
 }
 
 double Judge::distance(const MeasuredCurve* a, const MeasuredCurve* b, const std::string& observable) {

@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "protocol/study/statements.h"
@@ -30,6 +31,13 @@ class Judge {
   Judge(const PartResults& part, std::vector<Statement>& out) : part_(part), out_(&out) {}
 
   const PartResults& part() const { return part_; }
+
+  // The same judge for statements on these curves alone, whose seeds are what is said beside them.
+  Judge on(std::vector<const MeasuredCurve*> curves) const {
+    Judge other = *this;
+    other.curves_ = std::move(curves);
+    return other;
+  }
 
   // Unvaried curves, the first planned one; nullptr where there is none or none of its runs is done.
   const MeasuredCurve* reference() const;
@@ -64,6 +72,7 @@ class Judge {
   const MeasuredCurve* first(const std::function<bool(const PlannedCurve&)>& wanted) const;
   const PartResults& part_;
   std::vector<Statement>* out_;
+  std::vector<const MeasuredCurve*> curves_;  // that statements are on; empty: all with runs
 };
 
 std::string size_text(double radius);  // "R = 3.75 mm"

@@ -147,7 +147,8 @@ class Planner {
               if (spec.time_step.size() > 1) curve.label += fmt::format(" dt~R^{:g}", c);
               for (const VariedKey& key : spec.vary)
                 if (key.values.size() > 1)
-                  curve.label += fmt::format(" {}={}", last_key(key.key), plain_value(variant.at(key.key)));
+                  // A curve named after what it varies is called "f0=-0.3 N", not "f0 f0=-0.3 N".
+                  curve.label = fmt::format("{}{}={}", curve.label == last_key(key.key) ? "" : curve.label + " ", last_key(key.key), plain_value(variant.at(key.key)));
               part.curves.push_back(std::move(curve));
             }
   }

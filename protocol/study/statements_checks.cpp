@@ -99,8 +99,9 @@ void judge_figure_11(Judge& judge, const StudyPlan& plan) {
   }
 }
 
-void judge_quasi_static(Judge& judge, const StudyPlan& plan) {
-  for (const MeasuredCurve& curve : judge.part().curves) {
+void judge_quasi_static(Judge& all, const StudyPlan& plan) {
+  for (const MeasuredCurve& curve : all.part().curves) {
+    Judge judge = all.on({&curve});
     if (curve.runs.empty()) {
       judge.missing("quasi-static", curve.planned->label + ": strain rate, inertial number");
       continue;
@@ -118,12 +119,13 @@ void judge_quasi_static(Judge& judge, const StudyPlan& plan) {
                 inertial < 1e-4);
     const MeasuredCurve& reference = judge.part().curves[curve.planned->reference];
     if (&reference == &curve || judge.is_plain(curve) || reference.runs.empty()) continue;
-    inside_scatter(judge, "quasi-static", curve, reference, "strain_peak", "strain at the end of loading", 100.0, "%");
-    inside_scatter(judge, "quasi-static", curve, reference, "strength", "strength", 1e-3, "kPa");
-    inside_scatter(judge, "quasi-static", curve, reference, "initial_stiffness", "initial stiffness", 1e-3, "kPa");
+    Judge both = all.on({&curve, &reference});
+    inside_scatter(both, "quasi-static", curve, reference, "strain_peak", "strain at the end of loading", 100.0, "%");
+    inside_scatter(both, "quasi-static", curve, reference, "strength", "strength", 1e-3, "kPa");
+    inside_scatter(both, "quasi-static", curve, reference, "initial_stiffness", "initial stiffness", 1e-3, "kPa");
     const double change = std::abs(Judge::mean(&curve, "strain_peak") / Judge::mean(&reference, "strain_peak") - 1.0);
     if (loading_speed(plan, curve) < loading_speed(plan, reference))
-      judge.number("quasi-static", curve.planned->label + ": change of the strain at the end of loading, of it", change,
+      both.number("quasi-static", curve.planned->label + ": change of the strain at the end of loading, of it", change,
                    {.high = 0.02}, 2, "%", 100.0);
   }
 }
@@ -166,18 +168,19 @@ void judge_similarity_2(Judge& judge) {
     if (!error)
       judge.missing("S2", text);
     else if (!error->in_scatter)
-      judge.say("S2", text, fmt::format("{:.3f} % strain (scatter unknown, needs two seeds)", 100.0 * error->of_means),
+      judge.on({scaled, unscaled}).say("S2", text, fmt::format("{:.3f} % strain (scatter unknown, needs two seeds)", 100.0 * error->of_means),
                 std::nullopt);
     else {
       const double sigma = error->error / *error->in_scatter;
-      judge.say("S2", text, fmt::format("{:.3f} % strain, scatter {:.3f} %", 100.0 * error->of_means, 100.0 * sigma),
+      judge.on({scaled, unscaled}).say("S2", text, fmt::format("{:.3f} % strain, scatter {:.3f} %", 100.0 * error->of_means, 100.0 * sigma),
                 error->of_means <= sigma);
     }
   }
 }
 
-void judge_similarity_3(Judge& judge) {
-  for (const CollapseRow& row : judge.part().collapse) {
+void judge_similarity_3(Judge& all) {
+  for (const CollapseRow& row : all.part().collapse) {
+    Judge judge = all.on({&all.part().curves[row.curve], &all.part().curves[row.reference]});
     const std::string text = fmt::format("\"{}\" equals \"{}\" in {}, RMS distance below the scatter over seeds",
                                          judge.part().curves[row.curve].planned->label,
                                          judge.part().curves[row.reference].planned->label, row.observable);
@@ -198,7 +201,7 @@ void judge_friction_limit(Judge& judge) {
   for (const MeasuredCurve& curve : judge.part().curves) {
     const MeasuredCurve& reference = judge.part().curves[curve.planned->reference];
     if (&reference == &curve) continue;
-    judge.number("friction limit", fmt::format("{}: strength over that of {}", curve.planned->label, reference.planned->label),
+    judge.on({&curve, &reference}).number("friction limit", fmt::format("{}: strength over that of {}", curve.planned->label, reference.planned->label),
                  Judge::ratio(&curve, &reference, "strength"), {.high = 0.75}, 2);
   }
 }
@@ -221,14 +224,15 @@ void judge_like_reference(Judge& judge) {
       const std::string text = fmt::format("{}: {} over that of {}", curve.planned->label, q.name, reference.planned->label);
       const Estimate ratio = Judge::ratio(&curve, &reference, q.scalar);
       const bool lawful = judge.is_plain(curve) && curve.planned->powers.stiffness == wanted && curve.planned->powers.adhesion == 2.0;
+      Judge both = judge.on({&curve, &reference});
       if (lawful) {
-        judge.number(figure, text, ratio, {1.0 - q.band, 1.0 + q.band}, 3);
+        both.number(figure, text, ratio, {1.0 - q.band, 1.0 + q.band}, 3);
         if (curve.planned->radius > plan.reference_radius && reference.planned->radius == plan.reference_radius)
           coarser[curve.planned->radius] = std::isfinite(ratio.value) ? std::optional(std::abs(ratio.value - 1.0) <= q.band) : std::nullopt;
       } else if (std::isfinite(ratio.value)) {
-        judge.say(figure, text, fmt::format("{:.3f}{}", ratio.value, std::isfinite(ratio.error) ? fmt::format(" ± {:.3f}", ratio.error) : ""), std::nullopt);
+        both.say(figure, text, fmt::format("{:.3f}{}", ratio.value, std::isfinite(ratio.error) ? fmt::format(" ± {:.3f}", ratio.error) : ""), std::nullopt);
       } else {
-        judge.missing(figure, text);
+        both.missing(figure, text);
       }
     }
     if (coarser.size() < 2) continue;
