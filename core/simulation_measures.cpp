@@ -218,6 +218,18 @@ Measures Simulation::measure(bool stored_energies) {
 
 void Simulation::count_inserted() { inserted_ += measure().energy_residual; }
 
+std::int64_t Simulation::carry_down(double z, double speed) {
+  Particles& p = particles_;
+  std::vector<std::size_t> carried;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(p.count); ++k)
+    if (p.z[k] > z && p.vx[k] == 0.0 && p.vy[k] == 0.0 && p.ux[k] == 0.0 && p.uy[k] == 0.0 && p.uz[k] == 0.0) carried.push_back(k);
+  if (carried.empty()) return 0;
+  const double before = measure(false).kinetic_energy;
+  for (const std::size_t k : carried) p.vz[k] = p.rows[row_size * k + 6] = -speed;
+  inserted_ += measure(false).kinetic_energy - before;
+  return static_cast<std::int64_t>(carried.size());
+}
+
 Snapshot Simulation::snapshot(bool with_contacts) {
   const FloatMode mode;
   AlignedArray<double> sums;

@@ -7,6 +7,8 @@
 
 #include "protocol/case_sections.h"
 #include "protocol/particle_file.h"
+#include "protocol/sphere_facts.h"
+#include "protocol/stages/rain.h"
 
 namespace platen {
 namespace {
@@ -98,6 +100,13 @@ void check_stages(const Case& c, const CaseFacts& facts, Problems& problems) {
       }
       if (facts.plates_good && !c.plates.bottom) {
         refuse("fill by rain needs the bottom plate; allowed: plates.bottom = true, or method = \"grow\"");
+      }
+      if (stage.duration && facts.has_count && facts.sizes_good && facts.box_present && stage.drop_speed > 0.0) {
+        // As dense as where all fall at once is as dense as they may come.
+        const double least = sphere_facts(c).solid_volume / (c.box.width * c.box.depth * stage.drop_speed * rain_solid_fraction);
+        if (*stage.duration < least)
+          refuse(fmt::format("duration = {:g} s is too short for {} spheres to come out at {:g} m/s; allowed: at least {:.3g} s, a larger drop_speed, or "
+                             "no duration, where all fall at once", *stage.duration, c.particles.count, stage.drop_speed, least));
       }
     }
     if (stage.kind == StageKind::fill && facts.sides_good) {

@@ -117,10 +117,11 @@ struct StageSpec {
   std::optional<double> frames;        // overrides output.frames [s]; 0 = off
   FillMethod method = FillMethod::rain;
   double drop_speed = 0.5;             // fill by rain: downward [m/s]
+  std::optional<double> outlet;        // fill by rain with a duration: height that spheres fall from [m]
   std::optional<double> porosity;      // fill by growth: target [-]
   double frequency = 0.0;              // vibrate [Hz]
   double amplitude = 0.0;              // vibrate, peak to mean [m]
-  std::optional<double> duration;      // vibrate, hold, run [s]
+  std::optional<double> duration;      // vibrate, hold, run; fill by rain: how long it rains [s]
   double speed = 0.0;                  // compress, unload, crush [m/s] > 0
   Until until;
   double strain_zero = 0.0;            // stress at which strain starts to count [Pa]; compress 5 kPa, crush 20 Pa

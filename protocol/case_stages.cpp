@@ -71,6 +71,10 @@ void read_fill(TableReader& stage, StageSpec& out) {
   // Keys of the other method are unknown here; with a bad method both are let through.
   if (!method_good || out.method == FillMethod::rain) {
     stage.quantity("drop_speed", Quantity::speed, not_negative, Need::optional, out.drop_speed);
+    stage.quantity("duration", Quantity::time, positive, Need::optional, out.duration);
+    stage.quantity("outlet", Quantity::length, positive, Need::optional, out.outlet);
+    if (stage.has("outlet") && !stage.has("duration")) stage.error("outlet", "is given without duration; allowed: both, or neither, where all spheres fall at once");
+    if (stage.has("duration") && out.drop_speed == 0.0) stage.error("drop_speed", "is 0, so that nothing would come out in any duration; allowed: > 0");
   }
   if (!method_good || out.method == FillMethod::grow) {
     stage.number("porosity", fraction, method_good ? Need::required : Need::optional, out.porosity);
@@ -166,7 +170,8 @@ void read_stage(const CaseValue& value, const std::string& name, std::size_t num
     if (stage.quantity_or("frames", Quantity::time, positive, "off", frames)) out.frames = frames.value_or(0.0);
     read_by_kind(stage, who, out);
     const double wanted = std::max(out.duration.value_or(0.0), out.until.duration.value_or(0.0));
-    if (!has_limit) out.max_duration = std::max(default_max_duration, 1.01 * wanted);
+    const double to_land = out.kind == StageKind::fill ? 10.0 : 0.0;  // behind the last sphere of a rain
+    if (!has_limit) out.max_duration = std::max(default_max_duration, 1.01 * wanted + to_land);
     stage.refuse_unknown(who);
   }
   c.stages.push_back(std::move(out));

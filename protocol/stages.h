@@ -67,9 +67,10 @@ struct RestWatch {
 
 struct FillStage {
   std::optional<double> landed_since;  // [s]
-  static bool landed(const Stand& stand, const Measures& m);
+  std::int64_t in_outlet = 0;          // spheres that have not begun to fall
+  bool landed(const Stand& stand, const Measures& m) const;
   void begin(Stand& stand);
-  void update(Stand&, const Look&) {}
+  void update(Stand& stand, const Look& look);
   std::optional<std::string> done(Stand& stand, const Look& look);
   std::optional<std::int64_t> last_step(const Stand&) const { return std::nullopt; }
   void end(Stand& stand, StageResult& result);

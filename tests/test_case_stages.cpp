@@ -155,6 +155,15 @@ TEST(CaseStages, ImpossibleValues) {
                "case.toml:17:10: stage.fill.method: \"snow\" is unknown; allowed: \"rain\", \"grow\"");
 }
 
+TEST(CaseStages, RainsThatCannotBe) {
+  const auto rain = [](const std::string& keys) { return replaced("kind = \"fill\"", "kind = \"fill\"\n" + keys); };
+  EXPECT_EQ(errors_of(rain("duration = 5\noutlet = \"0.3 m\"")), "accepted");
+  expect_error(rain("outlet = 0.3"), "case.toml:17:10: stage.fill.outlet: is given without duration");
+  expect_error(rain("duration = 5\ndrop_speed = 0"), "case.toml:18:14: stage.fill.drop_speed: is 0, so that nothing would come out");
+  expect_error(rain("duration = \"0.01 s\""), "case.toml:16:8: stage.fill: duration = 0.01 s is too short for 100 spheres to come out at 0.5 m/s; allowed: at least 0.0582 s");
+  expect_error(rain("method = \"grow\"\nporosity = 0.5\nduration = 5"), "case.toml:19:1: stage.fill.duration: unknown key");
+}
+
 TEST(CaseStages, WhereParticlesComeFrom) {
   expect_error(replaced("[[stage]]\nkind = \"fill\"\n", ""),
                "case.toml:7:9: particles.count: nothing makes the particles");

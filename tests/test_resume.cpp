@@ -138,6 +138,9 @@ const std::string walls = replaced("count = 100", "count = 300", replaced("sides
                                                      replaced("k1 = \"5 kN/m\"\nk2 = \"25 kN/m\"\nk_adh = \"5 kN/m\"", "k1 = 2e5\nk2 = 4e5\nexponent = 1.5", small_bed))))) +
                           fill + quick_settle + press + unload;
 
+// Cohesive spheres through an outlet.
+const std::string slow_rain = small_bed + "[[stage]]\nkind = \"fill\"\nduration = \"0.5 s\"\noutlet = \"40 mm\"\n" + quick_settle;
+
 class Resume : public ::testing::TestWithParam<ResumeCase> {};
 
 TEST_P(Resume, InterruptedAtRandomItLeavesTheSame) {
@@ -159,7 +162,7 @@ TEST_P(Resume, InterruptedAtRandomItLeavesTheSame) {
   EXPECT_GT(resumed, 0) << "it was never interrupted: the test shows nothing";
 }
 
-INSTANTIATE_TEST_SUITE_P(Cases, Resume, ::testing::Values(ResumeCase{"EveryStage", every_stage}, ResumeCase{"WallsUnequalExponent", walls}),
+INSTANTIATE_TEST_SUITE_P(Cases, Resume, ::testing::Values(ResumeCase{"EveryStage", every_stage}, ResumeCase{"WallsUnequalExponent", walls}, ResumeCase{"SlowRain", slow_rain}),
                          [](const auto& chosen) { return std::string(chosen.param.name); });
 
 TEST(ResumeCommand, AfterEachStageWithoutTheParticleFile) {

@@ -40,6 +40,57 @@ TEST(Fill, RainGivesALooseBedWhoseSpheresHaveAllLanded) {
   }
 }
 
+const std::string slow_rain = "[[stage]]\nkind = \"fill\"\nduration = \"0.6 s\"\noutlet = \"60 mm\"\n";
+constexpr double outlet = 0.06, drop_speed = 0.5;
+
+TEST(Fill, ARainOfADurationFallsFromItsOutlet) {
+  const Trial run = run_case(small_bed + slow_rain + quick_settle, {"particles.law.f0=-0.1"});
+  ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
+  const StageResult& stage = run.stage("fill");
+  EXPECT_GT(stage.time_end, 0.6 - 0.05) << "the last ones come at its end";
+  EXPECT_LT(stage.time_end, 0.6 + 0.3);
+  const auto& rows = run.series.rows;
+  const double most = 0.5 * (drop_speed * drop_speed + 2.0 * 9.81 * outlet);
+  const double mass = run.stage("fill").last.measures.weight / 9.81;
+  bool some_left = false;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    EXPECT_LT(run.series.number(k, "kinetic_energy"), 1.02 * most * mass) << k;
+    some_left = some_left || (run.series.number(k, "time") > 0.3 && run.series.number(k, "height") > outlet + 0.1);
+  }
+  EXPECT_TRUE(some_left) << "a column of 0.3 m at the start, 0.15 m at half the time";
+  const Measures& m = run.stage("settle").last.measures;
+  EXPECT_NEAR(m.support_force, m.weight, 0.01 * m.weight);
+  EXPECT_LT(std::fabs(m.energy_residual), 0.01 * m.ledger.dissipated()) << "what the outlet takes counts as never put in";
+  RunOptions two;
+  two.threads = 2;
+  EXPECT_EQ(run_case(small_bed + slow_rain + quick_settle, {"output.frames=\"off\"", "particles.law.f0=-0.1"}, two).outcome.state_hash, run.outcome.state_hash);
+}
+
+TEST(Fill, TheOutletCarriesThoseThatHaveMetNothing) {
+  SimulationSetup s;
+  s.pair.k1 = 5e3, s.pair.k2 = 25e3;
+  s.plate.particle_young_modulus = 2.6e8, s.plate.young_modulus = 2.5e10;
+  s.spheres.id = {0, 1, 2, 3};
+  s.spheres.radius.assign(4, 0.0025), s.spheres.density.assign(4, 2000.0);
+  s.spheres.position = {0.01, 0.01, 0.10, 0.03, 0.01, 0.04, 0.05, 0.01, 0.10, 0.07, 0.01, 0.10};
+  s.spheres.velocity = {0, 0, -1, 0, 0, -1, 1e-9, 0, -1, 0, 0, -1};
+  s.spheres.spin = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1e-9, 0};
+  Simulation sim(s);
+  sim.set_time_step(1e-5);
+  sim.count_inserted();
+  sim.advance(100);
+  const Measures before = sim.measure();
+  EXPECT_EQ(sim.carry_down(0.05, 0.5), 1);
+  const Measures after = sim.measure();
+  const Snapshot snapshot = sim.snapshot();
+  const double fallen = -1.0 - 9.81 * 1e-3, m = after.weight / (4.0 * 9.81);
+  const double half = 0.5 * 9.81 * 1e-5;  // velocities are half a step old
+  EXPECT_NEAR(snapshot.particles.velocity[2], -0.5 - half, 1e-12);
+  for (std::size_t k : {1u, 2u, 3u}) EXPECT_NEAR(snapshot.particles.velocity[3 * k + 2], fallen, 1e-12) << k;
+  EXPECT_NEAR(after.kinetic_energy - before.kinetic_energy, 0.5 * m * ((0.5 + half) * (0.5 + half) - fallen * fallen), 1e-9 * before.kinetic_energy);
+  EXPECT_NEAR(after.energy_residual, before.energy_residual, 1e-12 * before.kinetic_energy);
+}
+
 TEST(Fill, WallsKeepTheSpheresInside) {
   const Trial run = run_case(small_bed + fill + quick_settle, {"box.sides=\"walls\"", "particles.count=80"});
   ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;

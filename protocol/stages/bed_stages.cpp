@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "protocol/stages.h"
+#include "protocol/stages/rain.h"
 
 namespace platen {
 
@@ -103,6 +104,11 @@ void FillStage::begin(Stand& stand) {
   if (stand.sim.plane(plate_top).present) stand.sim.remove_plane(plate_top);
 }
 
+// Between two looks they fall freely, 3 mm/s faster after 32 steps of 1e-5 s, all alike.
+void FillStage::update(Stand& stand, const Look&) {
+  in_outlet = stand.spec.duration ? stand.sim.carry_down(outlet_of(stand.c), stand.spec.drop_speed) : 0;
+}
+
 std::optional<std::string> FillStage::done(Stand& stand, const Look& look) {
   if (stand.spec.method == FillMethod::grow) return "bed grown to the target porosity";
   if (!landed(stand, look.m)) {
@@ -116,7 +122,8 @@ std::optional<std::string> FillStage::done(Stand& stand, const Look& look) {
 }
 
 // What still moves is a thousandth of the energy of position, and the bottom carries all.
-bool FillStage::landed(const Stand& stand, const Measures& m) {
+bool FillStage::landed(const Stand& stand, const Measures& m) const {
+  if (in_outlet > 0) return false;
   if (m.contacts == 0 && stand.sim.particles() > 1) return false;
   if (!(m.kinetic_energy <= 1e-3 * m.potential_energy && std::fabs(m.support_force - m.weight) <= 0.1 * m.weight)) return false;
   // In a large bed neither would notice a few late ones: none may be faster than from a fall by its own radius.

@@ -109,7 +109,7 @@ std::vector<double> rain_positions(const std::vector<double>& radii, double widt
   for (const double R : radii) {
     const double volume = 4.0 / 3.0 * std::numbers::pi * R * R * R;
     // Half a sphere too much is as good as half a sphere too little.
-    if (solid > 0.0 && solid + 0.5 * volume > layer_solid) low += layer_height, solid -= layer_solid;
+    while (solid > 0.0 && solid + 0.5 * volume > layer_solid) low += layer_height, solid -= layer_solid;
     const double x0 = periodic ? 0.0 : R, x1 = periodic ? width : width - R;
     const double y0 = periodic ? 0.0 : R, y1 = periodic ? depth : depth - R;
     for (int attempt = 0;; ++attempt) {

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "protocol/case_file.h"
 #include "protocol/stages/random_source.h"
 
 namespace platen {
@@ -18,6 +19,9 @@ namespace platen {
 std::vector<double> rain_positions(const std::vector<double>& radii, double width, double depth, bool periodic,
                                    double z_floor, double solid_fraction, RandomSource& random);
 
-inline constexpr double rain_solid_fraction = 0.25;
+inline constexpr double rain_solid_fraction = 0.25;  // where all spheres fall at once
+
+// Height that a rain with a duration falls from [m]: the one given, else that of the box.
+inline double outlet_of(const Case& c) { return c.stages.front().outlet.value_or(c.box.height); }
 
 }  // namespace platen
