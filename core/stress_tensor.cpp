@@ -50,6 +50,9 @@ BedStress bed_stress(const Snapshot& snapshot, double width, double depth) {
     const Vector F = (c.normal_force[k] + c.damping_force[k]) * n + row(c.tangential_force, k);
     moment += F * l.transpose();
     fabric += n * n.transpose();
+    const double overlap = c.overlap[k] / (p.radius[i] + p.radius[j]);
+    r.mean_overlap += overlap;
+    r.largest_overlap = std::max(r.largest_overlap, overlap);
   }
   const PlateContactFields& plates = snapshot.plate_contacts;
   for (std::size_t k = 0; k < plates.size(); ++k) {
@@ -59,7 +62,7 @@ BedStress bed_stress(const Snapshot& snapshot, double width, double depth) {
     moment += row(plates.force, k) * l.transpose();
   }
   r.pairs = static_cast<std::int64_t>(c.size());
-  if (r.pairs > 0) fabric /= static_cast<double>(r.pairs);
+  if (r.pairs > 0) fabric /= static_cast<double>(r.pairs), r.mean_overlap /= static_cast<double>(r.pairs);
   const Matrix stress = moment / r.volume, symmetric = 0.5 * (stress + stress.transpose());
   r.stress = tensor_of(stress), r.fabric = tensor_of(fabric);
   r.pressure = stress.trace() / 3.0;

@@ -26,6 +26,7 @@ struct BedStress {
   double pressure = 0.0;              // trace/3 [Pa]
   double deviator = 0.0;              // sqrt(3/2 s:s) of the symmetric deviatoric part [Pa]
   double fabric_deviator = 0.0;       // sqrt(3/2 a:a) of the fabric's deviatoric part [-]
+  double mean_overlap = 0.0, largest_overlap = 0.0;  // of pairs, over the sum of their radii [-]
   double volume = 0.0;                // width x depth x (z_top - z_bottom) [m3]
   std::int64_t pairs = 0;
 };

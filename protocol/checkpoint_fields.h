@@ -56,7 +56,7 @@ template <class V, class T>
   requires std::is_same_v<std::remove_const_t<T>, BedStress>
 void each(V& v, T& b) {
   v("stress", b.stress), v("fabric", b.fabric), v("principal", b.principal), v("principal_direction", b.principal_direction), v("pressure", b.pressure);
-  v("deviator", b.deviator), v("fabric_deviator", b.fabric_deviator), v("volume", b.volume), v("pairs", b.pairs);
+  v("deviator", b.deviator), v("fabric_deviator", b.fabric_deviator), v("mean_overlap", b.mean_overlap), v("largest_overlap", b.largest_overlap), v("volume", b.volume), v("pairs", b.pairs);
 }
 
 template <class V, class T>

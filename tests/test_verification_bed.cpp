@@ -180,6 +180,11 @@ TEST(VerificationBed, StressOfKnownContacts) {
     }
   EXPECT_NEAR(b.fabric_deviator, 1.0, 1e-12);  // all contacts in one direction
   EXPECT_THROW(bed_stress(s, 0.0, 0.2), std::invalid_argument);
+  EXPECT_DOUBLE_EQ(b.mean_overlap, 0.05);
+  c.pair.insert(c.pair.end(), {3, 8}), c.image.insert(c.image.end(), {0, -1}), c.overlap.push_back(0.003), c.plastic_overlap.push_back(0.0);
+  c.normal_force.push_back(0.0), c.damping_force.push_back(0.0), c.tangential_force.insert(c.tangential_force.end(), {0.0, 0.0, 0.0}), c.branch.push_back(1);
+  EXPECT_DOUBLE_EQ(bed_stress(s, 0.1, 0.2).mean_overlap, 0.1);
+  EXPECT_DOUBLE_EQ(bed_stress(s, 0.1, 0.2).largest_overlap, 0.15);
 }
 
 TEST(VerificationBed, Momentum) {

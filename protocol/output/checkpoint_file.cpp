@@ -17,7 +17,7 @@ namespace {
 constexpr const char* newest = "checkpoint.h5";
 constexpr const char* former = "checkpoint.prev.h5";
 constexpr const char *unnamed = "checkpoint.new", *content = "checkpoint.body";  // while one is written
-constexpr std::int64_t format = 1;
+constexpr std::int64_t format = 2;
 constexpr std::size_t plate_columns = 5 + record_size, plane_columns = 7;
 
 std::string last_line(std::string_view bytes) { return fmt::format("platen checkpoint, xxh3 {:016x}\n", XXH3_64bits(bytes.data(), bytes.size())); }

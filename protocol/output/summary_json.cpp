@@ -61,7 +61,10 @@ Json stage_json(const StageResult& s) {
                     {"principal", b.principal}, {"principal_direction", b.principal_direction}};
     const double upright = b.stress[2][2];
     if (upright > 0.0) set(stage["bed"], "lateral_stress_ratio", 0.5 * (b.stress[0][0] + b.stress[1][1]) / upright);
-    if (b.pairs > 0) stage["bed"]["fabric"] = b.fabric, stage["bed"]["fabric_deviator"] = b.fabric_deviator;
+    if (b.pairs > 0) {
+      stage["bed"]["fabric"] = b.fabric, stage["bed"]["fabric_deviator"] = b.fabric_deviator;
+      stage["bed"]["mean_overlap"] = b.mean_overlap, stage["bed"]["largest_overlap"] = b.largest_overlap;
+    }
   }
   stage["warnings"] = s.warnings;
   return stage;
