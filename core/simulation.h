@@ -122,9 +122,8 @@ class Simulation {
   // Energy of what is there now counts as inserted: called once when filling is done.
   void count_inserted();
 
-  // The outlet of a rain: spheres whose centre is above z [m] and which have met nothing yet, that is which neither turn nor
-  // move sideways, go on downwards with `speed` [m/s] instead of falling freely. What this changes of their energy counts as
-  // inserted. How many they are.
+  // The outlet of a rain: spheres whose centre is above z [m] and that fall straight down, with `speed` [m/s] or faster and
+  // without turning, go on with `speed`. What this changes of their energy counts as inserted. How many they are.
   std::int64_t carry_down(double z, double speed);
 
   std::int32_t particles() const { return particles_.count; }

@@ -222,7 +222,7 @@ std::int64_t Simulation::carry_down(double z, double speed) {
   Particles& p = particles_;
   std::vector<std::size_t> carried;
   for (std::size_t k = 0; k < static_cast<std::size_t>(p.count); ++k)
-    if (p.z[k] > z && p.vx[k] == 0.0 && p.vy[k] == 0.0 && p.ux[k] == 0.0 && p.uy[k] == 0.0 && p.uz[k] == 0.0) carried.push_back(k);
+    if (p.z[k] > z && p.vz[k] <= -speed && p.vx[k] == 0.0 && p.vy[k] == 0.0 && p.ux[k] == 0.0 && p.uy[k] == 0.0 && p.uz[k] == 0.0) carried.push_back(k);
   if (carried.empty()) return 0;
   const double before = measure(false).kinetic_energy;
   for (const std::size_t k : carried) p.vz[k] = p.rows[row_size * k + 6] = -speed;

@@ -15,6 +15,18 @@ namespace {
 
 constexpr double auto_skin = 0.3;  // of the largest radius: the widest that "auto" chooses
 
+// Spheres of a rain with a duration: not denser than where all fall at once, and not for ever.
+std::string rain_problem(const Case& c, const StageSpec& rain) {
+  const double least = solid_volume(c) / (c.box.width * c.box.depth * rain.drop_speed * rain_solid_fraction), most = 1000.0 * c.box.height / rain.drop_speed;
+  if (*rain.duration < least)
+    return fmt::format("duration = {:g} s is too short for {} spheres to come out at {:g} m/s; allowed: at least {:.3g} s, a larger drop_speed, or no "
+                       "duration, where all fall at once", *rain.duration, c.particles.count, rain.drop_speed, least);
+  if (*rain.duration > std::max(most, least))
+    return fmt::format("duration = {:g} s makes a column of spheres above 1000 times as high as the box; allowed: at most {:.3g} s, or a smaller drop_speed",
+                       *rain.duration, std::max(most, least));
+  return "";
+}
+
 bool any_stage(const Case& c, const CaseFacts& facts, StageKind kind) {
   for (std::size_t i = 0; i < c.stages.size(); ++i) {
     if (facts.stage_good[i] && c.stages[i].kind == kind) return true;
@@ -101,13 +113,8 @@ void check_stages(const Case& c, const CaseFacts& facts, Problems& problems) {
       if (facts.plates_good && !c.plates.bottom) {
         refuse("fill by rain needs the bottom plate; allowed: plates.bottom = true, or method = \"grow\"");
       }
-      if (stage.duration && facts.has_count && facts.sizes_good && facts.box_present && stage.drop_speed > 0.0) {
-        // As dense as where all fall at once is as dense as they may come.
-        const double least = sphere_facts(c).solid_volume / (c.box.width * c.box.depth * stage.drop_speed * rain_solid_fraction);
-        if (*stage.duration < least)
-          refuse(fmt::format("duration = {:g} s is too short for {} spheres to come out at {:g} m/s; allowed: at least {:.3g} s, a larger drop_speed, or "
-                             "no duration, where all fall at once", *stage.duration, c.particles.count, stage.drop_speed, least));
-      }
+      if (stage.duration && facts.has_count && facts.sizes_good && facts.width_good && facts.depth_good && facts.height_good && stage.drop_speed > 0.0)
+        if (const std::string problem = rain_problem(c, stage); !problem.empty()) refuse(problem);
     }
     if (stage.kind == StageKind::fill && facts.sides_good) {
       if (!facts.box_present && !c.plates.top && !c.plates.bottom) {

@@ -4,10 +4,12 @@
 #include <array>
 #include <functional>
 #include <numeric>
+#include <stdexcept>
 
 #include <fmt/format.h>
 
 #include "protocol/case_alternatives.h"
+#include "protocol/stages/draw_radii.h"
 
 namespace platen {
 namespace {
@@ -46,6 +48,19 @@ bool read_cumulative(TableReader& sizes, SizeDistribution& out) {
   return false;
 }
 
+// Whether a (log)normal distribution has anything to speak of between its min and max.
+bool can_be_drawn(const SizeDistribution& sizes) {
+  using Kind = SizeDistribution::Kind;
+  if ((sizes.kind != Kind::lognormal && sizes.kind != Kind::normal) || !(sizes.sigma > 0.0)) return true;
+  try {
+    RandomSource random(1);
+    draw_radius(sizes, random);
+    return true;
+  } catch (const std::invalid_argument&) {
+    return false;
+  }
+}
+
 bool read_range(TableReader& sizes, SizeDistribution::Kind kind, SizeDistribution& out) {
   out.kind = kind;
   const bool low = sizes.quantity("min", Quantity::length, positive, Need::required, out.min);
@@ -67,6 +82,9 @@ bool read_range(TableReader& sizes, SizeDistribution::Kind kind, SizeDistributio
     sizes.quantity("sigma", Quantity::length, positive, Need::required, out.sigma);
   if (good && centre_good && (out.median < out.min || out.median > out.max)) {
     sizes.error(centre, fmt::format("is not between min and max; allowed: min <= {} <= max", centre));
+  } else if (good && centre_good && !can_be_drawn(out)) {
+    sizes.error("sigma", "leaves almost nothing of the distribution between min and max; allowed: a smaller sigma, or a wider range");
+    return false;
   }
   return good;
 }

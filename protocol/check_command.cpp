@@ -114,6 +114,9 @@ void add_notes(const Case& c, CheckReport& report) {
     if (const ExpectedStage& e = report.stages[k]; e.needed > e.simulated * (1.0 + 1e-9))
       report.notes.push_back(fmt::format("{}: needs about {:.3g} s; max_duration = {:.3g} s ends the run before that (exit code {})", e.name, e.needed,
                                          e.simulated, static_cast<int>(exit_goal)));
+  if (const SphereFacts& f = report.spheres; f.count >= 100 && f.mass_max > 0.02 * f.mass_total)
+    report.notes.push_back(fmt::format("the largest sphere holds {:.0f} % of the volume: too few spheres for so broad a distribution; more of them, or a narrower range",
+                                       100.0 * f.mass_max / f.mass_total));
   for (const InertialNumber& i : report.inertial)
     if (i.value > 1e-3)
       report.notes.push_back(fmt::format("{}: inertial number {:.1e} at {} ({}): above 1e-3, not quasi-static there (it is below 1e-4)",

@@ -139,10 +139,9 @@ std::vector<ExpectedStage> expected_stages(const Case& c, const BedGuess& bed, s
     };
     switch (s.kind) {
       case StageKind::fill: {
-        const double v = s.drop_speed, fall = std::max(0.0, bed.rain_height - 0.5 * bed.height);
-        e.simulated = s.method == FillMethod::grow ? 0.0
-                      : s.duration                    ? *s.duration + 2.0 * to_land
-                                                      : (std::sqrt(v * v + 2.0 * c.gravity * fall) - v) / c.gravity + to_land;
+        const double v = s.drop_speed;
+        const double fall = std::max(0.0, s.duration ? outlet_of(c) - bed.height : bed.rain_height - 0.5 * bed.height);
+        e.simulated = s.method == FillMethod::grow ? 0.0 : s.duration.value_or(0.0) + (std::sqrt(v * v + 2.0 * c.gravity * fall) - v) / c.gravity + to_land;
         cost = cost_of_rain;
         break;
       }

@@ -6,10 +6,9 @@
 #include <numbers>
 
 #include "protocol/experiment.h"
-#include "protocol/sphere_facts.h"
+#include "protocol/stages/draw_radii.h"
 #include "protocol/stages/grow.h"
 #include "protocol/stages/rain.h"
-#include "protocol/stages/draw_radii.h"
 
 namespace platen {
 
@@ -36,11 +35,15 @@ SphereTable filled_spheres(const Case& c) {
   for (std::size_t k = 0; k < n; ++k) s.id.push_back(static_cast<std::int64_t>(k));
   const bool periodic = c.box.sides == Sides::periodic;
   if (fill.method == FillMethod::rain) {
-    // Through an outlet: as long a column above it as comes down in the time.
-    const double floor = fill.duration ? outlet_of(c) : 0.0;
-    double solid_fraction = rain_solid_fraction;
-    if (fill.duration) solid_fraction = std::min(solid_fraction, sphere_facts(c).solid_volume / (c.box.width * c.box.depth * fill.drop_speed * *fill.duration));
-    s.position = rain_positions(s.radius, c.box.width, c.box.depth, periodic, floor, solid_fraction, random);
+    if (fill.duration) {
+      const double z = outlet_of(c), column = rain_column(c, first_step(c).dt);
+      double solid = 0.0;
+      for (const double R : s.radius) solid += sphere_mass(R, 1.0);
+      const double solid_fraction = std::min(rain_solid_fraction, solid / (c.box.width * c.box.depth * column));
+      s.position = rain_positions(s.radius, c.box.width, c.box.depth, periodic, z, solid_fraction, random, z + column);
+    } else {
+      s.position = rain_positions(s.radius, c.box.width, c.box.depth, periodic, 0.0, rain_solid_fraction, random);
+    }
     for (std::size_t k = 0; k < n; ++k) s.velocity.insert(s.velocity.end(), {0.0, 0.0, -fill.drop_speed});
   } else {
     GrownBed bed = grow_bed(s.radius, c.box.width, c.box.depth, periodic, *fill.porosity, random);

@@ -15,7 +15,10 @@ std::string plan(const StageSpec& s) {
   std::string text;
   const auto add = [&](const std::string& part) { text += (text.empty() ? "" : ", ") + part; };
   switch (s.kind) {
-    case StageKind::fill: add(s.method == FillMethod::rain ? fmt::format("rain at {:g} m/s{}", s.drop_speed, s.outlet ? fmt::format(" from {:g} mm", 1e3 * *s.outlet) : "") : "growth"); break;
+    case StageKind::fill:
+      add(s.method == FillMethod::rain ? fmt::format("rain at {:g} m/s", s.drop_speed) : "growth");
+      if (s.outlet) add(fmt::format("from {:g} mm", 1e3 * *s.outlet));
+      break;
     case StageKind::vibrate: add(fmt::format("{:g} Hz, {:g} mm", s.frequency, 1e3 * s.amplitude)); break;
     case StageKind::hold: add(fmt::format("{:g} kPa", 1e-3 * s.stress)); break;
     default: break;

@@ -64,6 +64,15 @@ SphereFacts sphere_facts(const Case& c) {
   return f;
 }
 
+double solid_volume(const Case& c) {
+  const ParticleSpec& p = c.particles;
+  if (p.sizes.kind == SizeDistribution::Kind::mono) return sphere_mass(p.sizes.radius, 1.0) * static_cast<double>(p.count);
+  RandomSource random(c.seed);
+  double sum = 0.0;
+  for (std::int64_t k = 0; k < p.count; ++k) sum += sphere_mass(draw_radius(p.sizes, random), 1.0);
+  return sum;
+}
+
 std::optional<double> bond_number(const Case& c, const SphereFacts& spheres) {
   const double mean_mass = spheres.mass_total / static_cast<double>(spheres.count);
   if (!(c.gravity > 0.0)) return std::nullopt;

@@ -22,6 +22,9 @@ struct SphereFacts {
 };
 SphereFacts sphere_facts(const Case& c);
 
+// Of the spheres that `fill` makes [m3].
+double solid_volume(const Case& c);
+
 // |f0|/(m g) of the mean sphere; none without gravity.
 std::optional<double> bond_number(const Case& c, const SphereFacts& spheres);
 

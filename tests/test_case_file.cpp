@@ -125,6 +125,7 @@ TEST(CaseFile, BadSizeDistributions) {
   refused(R"({ kind = "list", radii = ["1 mm", "2 mm"], weights = [1] })", "weights", "one weight for each radius");
   refused(R"({ kind = "list", radii = ["1 mm"], weights = [0] })", "weights", "at least one weight > 0");
   refused(R"({ kind = "list", radii = [] })", "radii", "is empty");
+  refused(R"({ kind = "lognormal", median = "2 mm", sigma = 1e7, min = "1.999 mm", max = "2.001 mm" })", "sigma", "almost nothing of the distribution");
   refused(R"({ kind = "uniform", basis = "mass", min = "1 mm", max = "2 mm" })", "basis", "allowed: \"number\", \"volume\"");
   refused(R"({ kind = "cumulative", radii = ["1 mm", "1 mm"], below = [0, 1] })", "radii", "each larger than the one before");
   refused(R"({ kind = "cumulative", radii = ["1 mm", "2 mm"], below = [1, 0] })", "below", "none smaller than the one before");

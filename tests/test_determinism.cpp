@@ -201,6 +201,35 @@ TEST(Determinism, TwoHundredRepetitionsGiveOneHash) {
   }
 }
 
+// A lattice that comes down through an outlet, sphere by sphere.
+TEST(Determinism, RainFromAnOutlet) {
+  const auto rain = [](int threads, bool outlet) {
+    BedOptions o;
+    o.nx = 11, o.ny = 9, o.nz = 10, o.spacing = 2.2;
+    EngineOptions engine;
+    engine.threads = threads, engine.batch = threads == 1 ? 0 : 32 * threads;
+    SimulationSetup setup = scenes::bed(o, scenes::full_law(), engine);
+    const std::size_t n = setup.spheres.id.size();
+    setup.spheres.velocity.assign(3 * n, 0.0), setup.spheres.spin.assign(3 * n, 0.0);
+    for (std::size_t k = 0; k < n; ++k) setup.spheres.velocity[3 * k + 2] = -0.5;
+    Simulation sim(setup);
+    sim.set_time_step(1e-5);
+    scenes::add_plates(sim, 0.2, 0.0);
+    sim.count_inserted();
+    std::int64_t carried = 0;
+    for (int look = 0; look < 100; ++look) {
+      if (outlet) carried += sim.carry_down(0.01, 0.5);
+      sim.advance(32);
+    }
+    EXPECT_EQ(carried > 0, outlet);
+    EXPECT_GT(sim.measure().contacts, 100);
+    return Outcome{sim.state_hash(), numbers_of(sim.measure()), sim.counters()};
+  };
+  const Outcome wanted = rain(1, true);
+  for (const int threads : {2, 3}) expect_same(rain(threads, true), wanted, std::to_string(threads) + " threads");
+  EXPECT_NE(rain(1, false).hash, wanted.hash);
+}
+
 // Sides taken away, plates removed, a step that changes: each in mid-run, with another engine.
 TEST(Determinism, InterventionsInMidRun) {
   const Way eventful = [](Simulation& sim, std::int64_t steps) {

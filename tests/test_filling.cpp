@@ -222,6 +222,18 @@ TEST(Radii, DistributionsOfVolume) {
   radii = drawn(sizes);
   for (const double z : {-0.5, 0.0, 0.5}) EXPECT_NEAR(volume_below(radii, 2e-3 + 0.8e-3 * z), below(z), 5e-3) << z;
 
+  // A range far wider than what there is, and a broad distribution cut to a narrow range.
+  sizes.sigma = 0.1e-3;
+  sizes.min = 1e-5, sizes.max = 2.5e-3;
+  radii = drawn(sizes);
+  for (const double z : {-1.0, 0.0, 1.0}) EXPECT_NEAR(volume_below(radii, 2e-3 + 0.1e-3 * z), 0.5 + 0.5 * std::erf(z / std::sqrt(2.0)), 5e-3) << z;
+  sizes.kind = Kind::lognormal;
+  sizes.sigma = 1.6;
+  sizes.min = 1.5e-3, sizes.max = 2.5e-3;
+  radii = drawn(sizes);
+  const auto wide = [](double R) { return std::erf(std::log(R / 2e-3) / 1.6 / std::sqrt(2.0)); };
+  for (const double R : {1.7e-3, 2e-3, 2.3e-3}) EXPECT_NEAR(volume_below(radii, R), (wide(R) - wide(1.5e-3)) / (wide(2.5e-3) - wide(1.5e-3)), 5e-3) << R;
+
   sizes.kind = Kind::list;
   sizes.radii = {1e-3, 2e-3, 4e-3};
   sizes.weights = {1.0, 2.0, 1.0};

@@ -104,7 +104,6 @@ void FillStage::begin(Stand& stand) {
   if (stand.sim.plane(plate_top).present) stand.sim.remove_plane(plate_top);
 }
 
-// Between two looks they fall freely, 3 mm/s faster after 32 steps of 1e-5 s, all alike.
 void FillStage::update(Stand& stand, const Look&) {
   in_outlet = stand.spec.duration ? stand.sim.carry_down(outlet_of(stand.c), stand.spec.drop_speed) : 0;
 }

@@ -14,6 +14,9 @@ bool by_volume(const SizeDistribution& sizes) { return sizes.basis == SizeDistri
 // Spheres in a unit of volume, but for a constant.
 double number_in_volume(double R) { return 1.0 / (R * R * R); }
 
+// Standard deviations beyond which nothing is found: below 1e-12.
+constexpr double far_out = 7.2;
+
 // Between a and b: equally many in equal stretches of R, or equally much volume, so p_0(R) ~ R^-3, whose integral is
 // (a^-2 - R^-2) / 2.
 double draw_between(double a, double b, bool volume, RandomSource& random) {
@@ -26,17 +29,25 @@ double draw_between(double a, double b, bool volume, RandomSource& random) {
 // Spheres in a unit of volume that lies evenly between a and b: the mean of R^-3 there.
 double number_in_volume_between(double a, double b) { return 0.5 * (a + b) / (a * a * b * b); }
 
+// A (log)normal deviate between min and max. Of volume: one of volume is drawn, and made the more rarely the larger it is.
 double draw_normal(const SizeDistribution& sizes, RandomSource& random) {
   const bool log = sizes.kind == Kind::lognormal, volume = by_volume(sizes);
-  // A lognormal distribution of volume is one of numbers with the same sigma and a smaller median [Hatch1929].
-  const double median = log && volume ? sizes.median * portable_exp(-3.0 * sizes.sigma * sizes.sigma) : sizes.median;
+  double median = sizes.median, smallest = sizes.min;
+  bool thinned = volume;
+  if (volume && !log) {
+    smallest = std::max(smallest, median - far_out * sizes.sigma);
+  } else if (volume) {
+    // A lognormal distribution of volume is one of numbers with the same sigma and a smaller median [Hatch1929]; drawn like that
+    // where the range holds enough of it.
+    const double shift = 3.0 * sizes.sigma * sizes.sigma;
+    if (sizes.min <= 0.0 || portable_log(sizes.min / median) + shift <= 3.0 * sizes.sigma) median *= portable_exp(-shift), thinned = false;
+  }
   for (int attempt = 0; attempt < 1000000; ++attempt) {
     const double deviate = sizes.sigma * random.normal();
     const double R = log ? median * portable_exp(deviate) : median + deviate;
     // A largest radius of 0 stands for none.
     if (!(R > 0.0 && R >= sizes.min && (sizes.max <= 0.0 || R <= sizes.max))) continue;
-    // Of the volume that a normal deviate brings, fewer are made the larger they are.
-    if (!log && volume && !(random.uniform() < number_in_volume(R / sizes.min))) continue;
+    if (thinned && !(random.uniform() < number_in_volume(R / smallest))) continue;
     return R;
   }
   throw std::invalid_argument("particles.sizes: almost nothing of the distribution lies between min and max");

@@ -90,7 +90,7 @@ class Gas {
 }  // namespace
 
 std::vector<double> rain_positions(const std::vector<double>& radii, double width, double depth, bool periodic,
-                                   double z_floor, double solid_fraction, RandomSource& random) {
+                                   double z_floor, double solid_fraction, RandomSource& random, double z_ceiling) {
   if (radii.empty()) return {};
   const double largest = *std::max_element(radii.begin(), radii.end());
   if (!(*std::min_element(radii.begin(), radii.end()) > 0.0 && std::isfinite(largest)))
@@ -115,8 +115,9 @@ std::vector<double> rain_positions(const std::vector<double>& radii, double widt
     for (int attempt = 0;; ++attempt) {
       if (attempt == tries) low += layer_height, solid = 0.0, attempt = 0;
       const double z0 = std::max(low, z_floor + 1.05 * R);
+      const double z1 = z0 < z_ceiling ? std::min(low + layer_height, z_ceiling) : low + layer_height;
       const double x = x0 + (x1 - x0) * random.uniform(), y = y0 + (y1 - y0) * random.uniform(),
-                   z = z0 + (low + layer_height - z0) * random.uniform();
+                   z = z0 + (z1 - z0) * random.uniform();
       if (!gas.is_free(x, y, z, R)) continue;
       gas.add(x, y, z);
       solid += volume;

@@ -145,10 +145,13 @@ class Planner {
               if (spec.stiffness.size() > 1) curve.label += fmt::format(" a={:g}", a);
               if (spec.adhesion.size() > 1) curve.label += fmt::format(" b={:g}", b);
               if (spec.time_step.size() > 1) curve.label += fmt::format(" dt~R^{:g}", c);
+              std::string varied;
               for (const VariedKey& key : spec.vary)
                 if (key.values.size() > 1)
-                  // A curve named after what it varies is called "f0=-0.3 N", not "f0 f0=-0.3 N".
-                  curve.label = fmt::format("{}{}={}", curve.label == last_key(key.key) ? "" : curve.label + " ", last_key(key.key), plain_value(variant.at(key.key)));
+                  varied += fmt::format("{}{}={}", varied.empty() ? "" : " ", last_key(key.key), plain_value(variant.at(key.key)));
+              // A curve named after what it varies is called "f0=-0.3", not "f0 f0=-0.3".
+              const bool named = curve.label == spec.name && varied.starts_with(spec.name + "=");
+              if (!varied.empty()) curve.label = named ? varied : curve.label + " " + varied;
               part.curves.push_back(std::move(curve));
             }
   }

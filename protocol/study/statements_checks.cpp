@@ -201,8 +201,8 @@ void judge_friction_limit(Judge& judge) {
   for (const MeasuredCurve& curve : judge.part().curves) {
     const MeasuredCurve& reference = judge.part().curves[curve.planned->reference];
     if (&reference == &curve) continue;
-    judge.on({&curve, &reference}).number("friction limit", fmt::format("{}: strength over that of {}", curve.planned->label, reference.planned->label),
-                 Judge::ratio(&curve, &reference, "strength"), {.high = 0.75}, 2);
+    const std::string text = fmt::format("{}: strength over that of {}", curve.planned->label, reference.planned->label);
+    judge.on({&curve, &reference}).number("friction limit", text, Judge::ratio(&curve, &reference, "strength"), {.high = 0.75}, 2);
   }
 }
 
@@ -254,8 +254,9 @@ void judge_like_reference(Judge& judge) {
   }
 }
 
-void judge_cross_checks(Judge& judge) {
-  for (const MeasuredCurve& curve : judge.part().curves) {
+void judge_cross_checks(Judge& all) {
+  for (const MeasuredCurve& curve : all.part().curves) {
+    Judge judge = all.on({&curve});
     const std::string& label = curve.planned->label;
     if (curve.runs.empty()) {
       judge.missing("checks", label + ": weight on the bottom, overlaps");
