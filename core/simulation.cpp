@@ -86,9 +86,10 @@ void Simulation::setup_particles(const SphereTable& table) {
     if (domain_.width > 0.0) {  // a caller may pass unwrapped positions
       const auto wrap = [&](double& c, double length, std::size_t axis) {
         const double boxes = std::floor(c / length);
-        particles_.image[2 * k + axis] = static_cast<std::int32_t>(boxes);
+        std::int32_t& image = particles_.image[2 * k + axis];
+        image = static_cast<std::int32_t>(boxes);
         c -= boxes * length;
-        if (c >= length) c = 0.0;
+        if (c >= length) c = 0.0, ++image;  // a little below a side: rounded onto the one opposite
       };
       wrap(x, domain_.width, 0), wrap(y, domain_.depth, 1);
     }
@@ -203,7 +204,12 @@ void Simulation::set_plane_velocity(int plate, double velocity) {
 
 void Simulation::remove_plane(int plate) {
   FixedSum stored(energy_unit_);
-  for (const Batch& batch : batches_) add_plate_energy(batch.plates[plate], plate_law_, stored, particles_);
+  for (Batch& batch : batches_) {
+    PlateList& list = batch.plates[plate];
+    add_plate_energy(list, plate_law_, stored, particles_);
+    // Its springs go with it: a plane that is set again at once would take them over.
+    for (auto* column : {&list.xi_x, &list.xi_y, &list.xi_z, &list.stiffness_last}) std::fill(column->begin(), column->end(), 0.0);
+  }
   removed_ += stored.value();
   planes_[static_cast<std::size_t>(plate)].present = false;
   lists_valid_ = false, forces_valid_ = false;

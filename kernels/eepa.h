@@ -3,7 +3,7 @@
 //   s = delta^n;  s_p = plastic overlap to the power n, the history
 //   s_p  <- clamp(s_p, (1 - k1/k2) s, (1 + k_adh/k2) s)       loading and adhesive branches [Eq. 2, A2, A3]
 //   f_hys = f0 + k2 (s - s_p)                                  [Eq. 2]
-//   limit = mu |k2 (s - s_p) + k_adh s|                        [Eq. 9, 10, A11]; or mu |f_hys|, where a case asks for it
+//   limit = mu |k2 (s - s_p) + k_adh s|                        [Eq. 10, A11]; or mu |f_hys|, where a case asks for it
 //   K1    = n k1 delta^(n-1);  k_t = ratio K1                  [A8]
 //   beta_n^2 = 4 z (n+1)/(2n) m* K1;  beta_t^2 = ratio beta_n^2   [Eq. 4, 7, A8]
 #pragma once
@@ -80,7 +80,7 @@ PLATEN_INLINE NormalResponse<I> normal_response(typename I::Real s, typename I::
   return {sp, f_hys, height};
 }
 
-// The stored tangential spring, turned into the tangent plane of normal n with its length kept [Eq. 5]; was2 = |T_old|^2.
+// The stored tangential spring, turned into the tangent plane of normal n with its length kept [Eq. 6]; was2 = |T_old|^2.
 template <class I, bool exact>
 PLATEN_INLINE Vec3<I> turned_spring(const Vec3<I>& T_old, const Vec3<I>& n, const typename I::Real& was2) {
   using Real = typename I::Real;
@@ -91,7 +91,7 @@ PLATEN_INLINE Vec3<I> turned_spring(const Vec3<I>& T_old, const Vec3<I>& n, cons
   return scale<I>(I::where(product > tiny, was2 * inverse_sqrt<I, exact>(I::max(product, tiny)), I::set(1.0)), flat);
 }
 
-// How a spring T is cut back to its limit [Eq. 9, 10].
+// How a spring T is cut back to its limit [Eq. 10].
 template <class I>
 struct Cut {
   typename I::Mask slides;          // the limit holds

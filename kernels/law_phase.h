@@ -48,7 +48,7 @@ PLATEN_INLINE void springs_of_pairs(Chunk<scene>& chunk, int at, const PairBatch
   const auto touching = pairs.delta() > zero;
   sums.contacts += I::count(touching);
 
-  // spring before its advance [Eq. 5]
+  // spring before its advance [Eq. 6]
   const Vec3<I> T_old = {I::load(b.tx + k), I::load(b.ty + k), I::load(b.tz + k)};
   const Real was2 = dot(T_old, T_old);
   chunk.template put<I>(chunk.turned, at, turned_spring<I, exact>(T_old, pairs.n(), was2));
@@ -58,7 +58,7 @@ PLATEN_INLINE void springs_of_pairs(Chunk<scene>& chunk, int at, const PairBatch
       sums.add(&Energy::sliding, I::where(touching, zero, was2) * I::set(c.half_over_k_t), c);
   }
 
-  // f_hys [Eq. 2], F_n [Eq. 1, 3, 4], limit [Eq. 9, 10, A11]
+  // f_hys [Eq. 2], F_n [Eq. 1, 3, 4], limit [Eq. 10, A11]
   const Real s = overlap_power<I, scene.exponent>(I::where(touching, pairs.delta(), zero), c);
   const Real sp_old = scene.plasticity ? I::load(b.sp + k) : zero;
   const NormalResponse<I> normal = normal_response<I, scene>(s, sp_old, c);
@@ -102,7 +102,7 @@ PLATEN_INLINE void forces_of_pairs(Chunk<scene>& chunk, int at, const PairBatch&
   const Real beta_n = common_beta_n<scene> ? I::set(c.beta_n) : pairs.beta_n();
   const Real k_t = common_k_t<scene> ? I::set(c.k_t) : pairs.k_t();
 
-  // spring and its limit [Eq. 5, 9, 10]
+  // spring and its limit [Eq. 6, 7, 10]
   const Vec3<I> T = sub_scaled<I>(pairs.turned(), k_t * I::set(c.dt), pairs.v_t());
   const Real size2 = dot(T, T);
   const Cut<I> cut = cut_to<I, exact>(pairs.limit(), size2);
@@ -124,7 +124,7 @@ PLATEN_INLINE void forces_of_pairs(Chunk<scene>& chunk, int at, const PairBatch&
   }
   I::store(b.tx + k, T_new.x), I::store(b.ty + k, T_new.y), I::store(b.tz + k, T_new.z);
 
-  // F_t [Eq. 6, 7, A10]
+  // F_t [Eq. 5, 8, 9, A10]
   const Real beta_t = beta_n * I::set(c.beta_ratio);
   const Vec3<I> v_t = pairs.v_t();
   const Vec3<I> F_t = sub_scaled<I>(T_new, I::where(cut.slides, zero, beta_t), v_t);

@@ -82,6 +82,10 @@ bool read_f0_alternative(TableReader& law, std::string_view key, const ParticleS
     good &= data.quantity("surface_energy", Quantity::stiffness, positive, Need::required, gamma);
     good &= data.word("model", {"dmt", "jkr", "plastic_jkr"}, Need::required, model);
     if (data.has("flattening")) good &= data.number("flattening", Range{1.0, infinite}, Need::optional, flattening);
+    if (good && data.has("flattening") && model != 2) {
+      data.error("flattening", "has no part in this model; allowed: with model = \"plastic_jkr\"");
+      good = false;
+    }
     if (good)
       out = f0_of_surface_energy(
           R, gamma, std::array{AdhesionModel::dmt, AdhesionModel::jkr, AdhesionModel::plastic_jkr}[model], flattening);

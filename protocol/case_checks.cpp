@@ -79,7 +79,7 @@ void check_box(const Case& c, const CaseFacts& facts, Problems& problems) {
                    fmt::format("{:.6g} m is too narrow for a periodic box, a sphere would meet itself or one "
                                "partner twice; allowed: >= 4 R_max + 2 skin = {:.6g} m (R_max = {:.6g} m)",
                                length, narrowest, R_max));
-    } else if (c.box.sides == Sides::walls) {
+    } else {
       problems.add(where, key,
                    fmt::format("{:.6g} m is narrower than the largest sphere; allowed: >= 2 R_max = {:.6g} m (R_max = {:.6g} m)", length,
                                narrowest, R_max));
@@ -121,6 +121,10 @@ void check_stages(const Case& c, const CaseFacts& facts, Problems& problems) {
         refuse("fill needs [box], the region to fill; allowed: [box] with width, depth, height");
       } else if (stage.method == FillMethod::grow && facts.box_present && sides == Sides::open) {
         refuse("fill by growth needs closed sides; allowed: box.sides = \"periodic\" or \"walls\"");
+      } else if (stage.method == FillMethod::grow && stage.porosity && facts.has_count && facts.sizes_good && facts.width_good && facts.depth_good) {
+        const double height = solid_volume(c) / (c.box.width * c.box.depth * (1.0 - *stage.porosity)), least = 2.001 * c.particles.sizes.largest();
+        if (height < least)
+          refuse(fmt::format("{} spheres make a bed of {:.4g} m, less than a diameter; allowed: beds of {:.4g} m and more, by more spheres or a smaller width or depth", c.particles.count, height, least));
       }
     }
     if (stage.kind == StageKind::release) {

@@ -25,8 +25,10 @@ bool read_list(TableReader& sizes, SizeDistribution& out) {
     sizes.error("weights", fmt::format("has {} entries for {} radii; allowed: one weight for each radius", out.weights.size(), out.radii.size()));
   } else if (weights_good && !(std::accumulate(out.weights.begin(), out.weights.end(), 0.0) > 0.0)) {
     sizes.error("weights", "are all 0; allowed: at least one weight > 0");
+  } else {
+    return good && weighted == weights_good;
   }
-  return good;
+  return false;
 }
 
 bool read_cumulative(TableReader& sizes, SizeDistribution& out) {
@@ -76,13 +78,12 @@ bool read_range(TableReader& sizes, SizeDistribution::Kind kind, SizeDistributio
   if (!log && !sizes.has("median")) centre = "mean";  // the median of a normal distribution is its mean: both words do
   if (!log && centre == "median" && sizes.has("mean")) sizes.error("mean", "is given beside median; allowed: one of them");
   const bool centre_good = sizes.quantity(centre, Quantity::length, positive, Need::required, out.median);
-  if (log)
-    sizes.number("sigma", positive, Need::required, out.sigma);
-  else
-    sizes.quantity("sigma", Quantity::length, positive, Need::required, out.sigma);
-  if (good && centre_good && (out.median < out.min || out.median > out.max)) {
+  const bool sigma_good = log ? sizes.number("sigma", positive, Need::required, out.sigma) : sizes.quantity("sigma", Quantity::length, positive, Need::required, out.sigma);
+  good = good && centre_good && sigma_good;
+  if (low && high && out.min < out.max && centre_good && (out.median < out.min || out.median > out.max)) {
     sizes.error(centre, fmt::format("is not between min and max; allowed: min <= {} <= max", centre));
-  } else if (good && centre_good && !can_be_drawn(out)) {
+    return false;
+  } else if (good && !can_be_drawn(out)) {
     sizes.error("sigma", "leaves almost nothing of the distribution between min and max; allowed: a smaller sigma, or a wider range");
     return false;
   }

@@ -157,7 +157,7 @@ void read_stage(const CaseValue& value, const std::string& name, std::size_t num
   const bool kind_good = stage.word("kind", kinds, Need::required, kind);
   std::string written;
   if (stage.text("name", Need::optional, written) && !is_good_name(written)) {
-    stage.error("name", "is not a good name; allowed: a letter, then letters, digits, spaces, - and _, at most 64");
+    stage.error("name", "is not a good name; allowed: a letter, then letters, digits, spaces, - and _, at most 64, no space at the end");
   }
   facts.stage.push_back(stage.where("kind"));
   facts.stage_good.push_back(kind_good);

@@ -7,6 +7,7 @@
 #include <csignal>
 
 #include "protocol/guards.h"
+#include "protocol/sphere_facts.h"
 
 namespace platen {
 
@@ -22,7 +23,7 @@ RunOutcome Experiment::run() {
       sim_ = make_simulation(c_, options_.threads, options_.reproducible);
       farthest_allowed_ = 1000.0 * size_of_space(c_, *sim_);
       free_ = first_step(c_).limits;
-      density_ = c_.particles.table ? c_.particles.table->density.front() : c_.particles.density;
+      density_ = c_.particles.table ? sphere_facts(c_).density : c_.particles.density;
     } else {
       sim_ = make_simulation(c_, *from_, options_.threads);
       first = take_up();

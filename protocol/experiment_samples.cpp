@@ -33,7 +33,7 @@ void Experiment::sample(std::size_t stage, double speed) {
 std::int64_t Experiment::next_step_of(double interval) const {
   if (!(interval > 0.0)) return std::numeric_limits<std::int64_t>::max();
   const double done = std::floor(sim_->time() / interval * (1.0 + 1e-12) + 1e-9);
-  return sim_->step() + std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(((done + 1.0) * interval - sim_->time()) / sim_->time_step() - 1e-6)));
+  return sim_->step() + std::max<std::int64_t>(1, static_cast<std::int64_t>(std::min(1e15, std::ceil(((done + 1.0) * interval - sim_->time()) / sim_->time_step() - 1e-6))));
 }
 
 void Experiment::add_frame() {

@@ -25,7 +25,7 @@ SphereTable spheres_from(const ParticleTable& t) {
   return s;
 }
 
-SphereTable filled_spheres(const Case& c) {
+SphereTable filled_spheres(const Case& c) try {
   const StageSpec& fill = c.stages.front();
   RandomSource random(c.seed);
   SphereTable s;
@@ -53,6 +53,8 @@ SphereTable filled_spheres(const Case& c) {
     s.position = std::move(bed.position);
   }
   return s;
+} catch (const std::invalid_argument& error) {  // a box too narrow in a way that no check of the case knows
+  throw RunError(std::string("fill: ") + error.what());
 }
 
 }  // namespace

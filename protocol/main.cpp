@@ -5,6 +5,8 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -70,8 +72,10 @@ void add_threads(CLI::App& app, std::optional<int>& threads) {
       ->check(CLI::Range(1, most_threads));
 }
 
-// Lengths and times of options, with the message of the unit reader.
+// Lengths of options, plain numbers being metres; with the message of the unit reader.
 double option_value(const char* option, const std::string& text, Quantity quantity) {
+  double plain = 0.0;
+  if (const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), plain); error == std::errc{} && end == text.data() + text.size() && std::isfinite(plain)) return plain;
   try {
     return to_si(text, quantity);
   } catch (const UnitError& error) {
@@ -104,7 +108,7 @@ Command add_run(CLI::App& program) {
   app->add_flag("--force", command->force, "replace the run that is in the folder");
   app->add_flag_callback("--no-report", [command] { command->report = false; }, "write no report.html");
   app->add_flag("--json", command->json, "print the summary as JSON");
-  app->add_flag("-q,--quiet", command->quiet, "print nothing but errors");
+  app->add_flag("-q,--quiet", command->quiet, "print nothing but errors, and warnings about files");
   return {app, "platen run protocol/cases/quick.toml -o runs/first --set stage.compress.speed='\"20 mm/s\"'", [=] {
             check_instruction_set();
             if (!walltime->empty()) command->max_walltime = parse_walltime(*walltime);
@@ -122,7 +126,7 @@ Command add_resume(CLI::App& program) {
   app->add_option("--stop-after", command->stop_after, "end after this stage, by name or number")->type_name("STAGE");
   app->add_flag_callback("--no-report", [command] { command->report = false; }, "write no report.html");
   app->add_flag("--json", command->json, "print the summary as JSON");
-  app->add_flag("-q,--quiet", command->quiet, "print nothing but errors");
+  app->add_flag("-q,--quiet", command->quiet, "print nothing but errors, and warnings about files");
   return {app, "platen resume runs/first", [=] {
             check_instruction_set();
             if (!walltime->empty()) command->max_walltime = parse_walltime(*walltime);
@@ -177,7 +181,7 @@ Command add_study(CLI::App& program) {
   app->add_option("-o,--output", command->folder, "folder of the results; a study that is there already goes on")
       ->type_name("DIR")
       ->required();
-  app->add_option("--jobs", command->jobs, "runs at a time (default: the cores that this process may use)")
+  app->add_option("--jobs", command->jobs, "runs at a time (default: the cores that this process may use, over the threads of a run)")
       ->type_name("J")
       ->check(CLI::Range(1, most_threads));
   app->add_option("--set", command->overrides, "change one key of the study, as study.seeds='[1, 2, 3]'. May be repeated")
@@ -185,7 +189,7 @@ Command add_study(CLI::App& program) {
       ->take_all()
       ->allow_extra_args(false);
   app->add_flag("--dry-run", command->dry_run, "print the runs and end");
-  app->add_flag("-q,--quiet", command->quiet, "print nothing but errors");
+  app->add_flag("-q,--quiet", command->quiet, "print nothing but errors, and warnings about files");
   return {app, "platen study protocol/studies/fig4-7.toml -o studies/fig4-7", [=] {
             check_instruction_set();
             return study_command(*command);
@@ -197,7 +201,7 @@ Command add_report(CLI::App& program) {
   auto command = std::make_shared<ReportCommand>();
   app->add_option("DIR", command->folders, "run folders")->type_name("DIR")->required();
   app->add_option("-o,--output", command->output, "the page (default: report.html in the folder; of several, here)")->type_name("FILE");
-  app->add_flag("-q,--quiet", command->quiet, "print nothing but errors");
+  app->add_flag("-q,--quiet", command->quiet, "print nothing but errors, and warnings about files");
   return {app, "platen report runs/soft runs/stiff -o comparison.html", [=] { return report_command(*command); }};
 }
 
@@ -207,7 +211,7 @@ Command add_export(CLI::App& program) {
   app->add_option("DIR", command->folder, "run folder")->type_name("DIR")->required();
   app->add_option("--to", command->format, "format")->type_name("csv|vtu|lammps|h5md")->required()->check(CLI::IsMember({"csv", "vtu", "lammps", "h5md"}));
   app->add_option("-o,--output", command->output, "folder of the files (default: DIR/export)")->type_name("DIR");
-  app->add_flag("-q,--quiet", command->quiet, "print nothing but errors");
+  app->add_flag("-q,--quiet", command->quiet, "print nothing but errors, and warnings about files");
   return {app, "platen export runs/first --to csv", [=] { return export_command(*command); }};
 }
 

@@ -33,7 +33,10 @@ void report_end(const RunOutcome& outcome, const fs::path& folder, bool quiet) {
   switch (outcome.exit_code) {
     case exit_done: break;
     case exit_stopped:
-      if (!quiet) spdlog::warn("{}; what there is so far: {}; `platen resume {}` goes on", outcome.message, folder.string(), folder.string());
+      if (!has_checkpoint(folder))
+        spdlog::warn("{}; what there is so far: {}; there is no checkpoint to go on from", outcome.message, folder.string());
+      else if (!quiet)
+        spdlog::warn("{}; what there is so far: {}; `platen resume {}` goes on", outcome.message, folder.string(), folder.string());
       break;
     default: spdlog::error("{}; what there is so far: {}", outcome.message, folder.string());
   }

@@ -6,7 +6,7 @@
 //   last_step(stand)     the step at which it ends whatever else happens, where that is exact
 //   end(stand, result)   leaves the bed as the next stage expects it, adds its own figures to the result
 //
-// Equations: docs/laws.md, "The experiment".
+// Equations: docs/laws.md, "What is measured".
 #pragma once
 
 #include <cstdint>
@@ -25,6 +25,9 @@ namespace platen {
 
 // A sample that keeps less of its height than this when its sides go fell over or to pieces: what a crush finds then is not its strength.
 inline constexpr double standing = 0.8;
+
+// A drop counts once the peak was this many times the stress at which strain counts: before, a plate just meets single spheres.
+inline constexpr double least_peak_of_drop = 10.0;
 
 // What stages work on and hand to each other.
 struct Stand {

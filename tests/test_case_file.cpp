@@ -125,6 +125,9 @@ TEST(CaseFile, BadSizeDistributions) {
   refused(R"({ kind = "list", radii = ["1 mm", "2 mm"], weights = [1] })", "weights", "one weight for each radius");
   refused(R"({ kind = "list", radii = ["1 mm"], weights = [0] })", "weights", "at least one weight > 0");
   refused(R"({ kind = "list", radii = [] })", "radii", "is empty");
+  // How long it must rain is not asked of sizes that are wrong.
+  for (const char* sizes : {R"({ kind = "list", radii = ["1 mm", "2 mm"], weights = [1] })", R"({ kind = "lognormal", median = "5 mm", sigma = 0.2, min = "1 mm", max = "4 mm" })"})
+    EXPECT_THROW(parse_case(replaced("radius = \"2.5 mm\"", std::string("sizes = ") + sizes), "case.toml", ".", {"stage.fill.duration=\"5 s\""}), CaseError);
   refused(R"({ kind = "lognormal", median = "2 mm", sigma = 1e7, min = "1.999 mm", max = "2.001 mm" })", "sigma", "almost nothing of the distribution");
   refused(R"({ kind = "uniform", basis = "mass", min = "1 mm", max = "2 mm" })", "basis", "allowed: \"number\", \"volume\"");
   refused(R"({ kind = "cumulative", radii = ["1 mm", "1 mm"], below = [0, 1] })", "radii", "each larger than the one before");

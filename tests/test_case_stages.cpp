@@ -88,6 +88,21 @@ TEST(CaseStages, KindAndName) {
             "my rest");
 }
 
+TEST(CaseStages, ABedMustHaveRoomForASphere) {
+  const auto complaint = [](const std::vector<std::string>& overrides) -> std::string {
+    try {
+      parse_case(good_case, "case.toml", ".", overrides);
+    } catch (const CaseError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const std::vector<std::string> grown{"stage.fill.method=\"grow\"", "stage.fill.porosity=0.4", "particles.count=50", "box.width=\"150 mm\"", "box.depth=\"50 mm\""};
+  EXPECT_NE(complaint(grown).find("50 spheres make a bed of 0.0007272 m, less than a diameter"), std::string::npos) << complaint(grown);
+  const std::vector<std::string> open{"box.sides=\"open\"", "box.width=\"4 mm\""};
+  EXPECT_NE(complaint(open).find("box.width: 0.004 m is narrower than the largest sphere"), std::string::npos) << complaint(open);
+}
+
 TEST(CaseStages, NoStages) {
   const std::string without = good_case.substr(0, good_case.find("[[stage]]"));
   expect_error(without, "case.toml:1:1: stage: there are no stages; allowed: at least one [[stage]]");

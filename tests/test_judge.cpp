@@ -150,6 +150,44 @@ TEST(Judge, SeedsAreThoseOfTheCurvesThatAStatementIsOn) {
   for (const Statement& s : said) EXPECT_EQ(s.seeds, s.text.starts_with("b") ? 3 : s.text.starts_with("c") ? 2 : 0) << s.text;
 }
 
+// The same of the figures: 3 mm lost a seed, 5 mm all, and what is said of 4 mm has three.
+TEST(Judge, SeedsOfFiguresAreThoseOfTheirCurves) {
+  Study study;
+  PlannedPart planned;
+  planned.study = &study, planned.reference_radius = 2e-3;
+  PartResults part;
+  part.plan = &planned;
+  const std::map<double, std::vector<std::uint64_t>> seeds{{2e-3, {1, 2, 3}}, {3e-3, {2, 3}}, {4e-3, {1, 2, 3}}, {5e-3, {}}};
+  for (const auto& [radius, own] : seeds) {
+    CurveSpec spec;
+    spec.name = size_text(radius);
+    study.curves.push_back(spec);
+    PlannedCurve curve;
+    curve.label = curve.block = spec.name, curve.radius = radius, curve.powers.stiffness = 1.0, curve.powers.adhesion = 2.0;
+    planned.curves.push_back(curve);
+  }
+  for (const PlannedCurve& curve : planned.curves) {
+    MeasuredCurve measured;
+    measured.planned = &curve, measured.seeds = seeds.at(curve.radius);
+    for (std::size_t k = 0; k < measured.seeds.size(); ++k) {
+      RunMeasures run;
+      run.scalars = {{"strain_peak", 0.1}, {"strength", 1e4}, {"initial_stiffness", 1e5}, {"porosity_start", 0.4}, {"porosity_peak", 0.39}, {"porosity_at_zero", 0.4},
+                     {"coordination_peak", 6.0}, {"coordination_unloaded", 6.0}, {"coordination_released", 5.0}};
+      measured.runs.push_back(run);
+    }
+    part.curves.push_back(measured);
+  }
+  std::vector<Statement> said;
+  Judge judge(part, said);
+  judge_figures_12_14(judge);
+  judge_figures_8_10(judge);
+  ASSERT_EQ(said.size(), 3u * 10 + 3 + 3 * 4 + 1);
+  for (const Statement& s : said) {
+    const int expected = s.text.starts_with("R = 3 mm") ? 2 : s.text.starts_with("R = 4 mm") ? 3 : s.text.starts_with("Rumpf") ? 2 : 0;
+    EXPECT_EQ(s.seeds, expected) << s.text;
+  }
+}
+
 // What changes of a bed of half the plate speed, with three seeds each: by how much, with its standard error, against the scatter.
 TEST(Judge, ChangesStandBesideTheirOwnErrorAndTheScatter) {
   Study study;

@@ -231,6 +231,7 @@ TEST(LawProgram, CycleUsesTheRadiusOfTheCase) {
   EXPECT_DOUBLE_EQ(largest({"law", "bare.toml", "--cycle"}), 1.5e-4);
   EXPECT_DOUBLE_EQ(largest({"law", "sized.toml", "--cycle"}), 1.5 * 0.05 * 4e-3);
   EXPECT_DOUBLE_EQ(largest({"law", "bare.toml", "--cycle", "--contact", "plate", "--radius", "2 mm"}), 1.5 * 0.05 * 2e-3);
+  EXPECT_DOUBLE_EQ(largest({"law", "bare.toml", "--cycle", "--contact", "plate", "--radius", "0.002"}), 1.5 * 0.05 * 2e-3) << "metres";
 }
 
 TEST(LawProgram, WhatIsWrongDecidesTheExitCode) {

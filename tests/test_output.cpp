@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
+#include "protocol/output/files.h"
 #include "protocol/output/hdf5_file.h"
 #include "tests/sample_run.h"
 
@@ -180,6 +181,23 @@ TEST_F(Output, SummaryOfAFailedRunHasNoHash) {
   EXPECT_FALSE(summary.contains("state_hash"));
   EXPECT_EQ(summary.at("exit_code"), 4);
   EXPECT_TRUE(summary.at("stages").is_array());
+}
+
+TEST_F(Output, ForceLeavesWhatNoRunWrote) {
+  for (const char* name : {"results.h5", "series.csv", "checkpoint.h5", "case.toml"}) {
+    const fs::path folder = root / (std::string("mine-") + name);
+    fs::create_directories(folder);
+    write_whole_file(folder / name, "mine");
+    EXPECT_THROW(RunFolder::create(folder, case_text, true), OutputError) << name;
+    EXPECT_EQ(contents(folder / name), "mine");
+  }
+  // The case itself may stand there, and what a run wrote goes.
+  fs::create_directories(root / "here");
+  write_whole_file(root / "here/case.toml", case_text);
+  { RunFolder run = RunFolder::create(root / "here", case_text, true); }
+  write_whole_file(root / "here/results.h5", "of a run");
+  RunFolder::create(root / "here", case_text, true);
+  EXPECT_FALSE(fs::exists(root / "here/results.h5"));
 }
 
 TEST_F(Output, LogIsOneObjectALine) {

@@ -3,7 +3,9 @@
 #include <deque>
 #include <set>
 
+#include "protocol/output/hdf5_file.h"
 #include "protocol/study/observables.h"
+#include "tests/case_texts.h"
 #include "tests/experiment_case.h"
 
 namespace platen::test {
@@ -295,6 +297,36 @@ TEST(Release, AStudyTakesNoStrengthOfASampleThatFell) {
     EXPECT_EQ(found.scalars.contains("initial_stiffness"), sticky && run.stage("crush").initial_stiffness);
     EXPECT_EQ(found.curves.contains("unconfined"), sticky);
   }
+}
+
+// However wide lists are: springs of a loaded plate that is lifted are removed energy, once.
+TEST(Release, ALoadedPlateTakesItsSpringsAlong) {
+  const std::string text = small_bed + fill + quick_settle + press + "[[stage]]\nkind = \"release\"\nuntil = { kinetic_to_potential = 1e-2, window = \"5 ms\" }\n";
+  const Trial usual = run_case(text), wide = run_case(text, {"engine.inner_gap=\"2 mm\"", "engine.skin=\"2.2 mm\""});
+  ASSERT_EQ(usual.outcome.exit_code, exit_done) << usual.outcome.message;
+  EXPECT_EQ(usual.outcome.state_hash, wide.outcome.state_hash);
+  const Ledger &a = usual.stage("release").last.measures.ledger, &b = wide.stage("release").last.measures.ledger;
+  EXPECT_EQ(a.sliding_dissipation, b.sliding_dissipation);
+  EXPECT_EQ(a.removed_energy, b.removed_energy);
+}
+
+// Of unequal spheres the overlap is that over the diameter of the smaller one.
+TEST(Compress, LargestOverlapOfUnequalSpheres) {
+  const Trial run = run_case(replaced("radius = \"2.5 mm\"", "sizes = { kind = \"list\", radii = [\"1.5 mm\", \"2.5 mm\"] }", small_bed) + fill + quick_settle + press);
+  ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
+  const auto file = Hdf5File::open(run.path() / "results.h5");
+  const Hdf5Group contacts = file.root().group("contacts");
+  const auto overlap = contacts.read<double>("overlap"), plastic = contacts.read<double>("plastic_overlap"), radius = file.root().group("particles").read<double>("radius");
+  const auto pair = contacts.read<std::int64_t>("pair");
+  double expected = 0.0, over_largest = 0.0;
+  for (std::size_t k = 0; k < overlap.size(); ++k) {
+    const double ever = std::max(overlap[k], plastic[k] / 0.8), R = std::min(radius.at(static_cast<std::size_t>(pair[2 * k])), radius.at(static_cast<std::size_t>(pair[2 * k + 1])));  // ids are places
+    expected = std::max(expected, ever / (2.0 * R)), over_largest = std::max(over_largest, ever / 5e-3);
+  }
+  const RunMeasures found = measure_run(run.path(), run.c, std::nullopt);
+  EXPECT_DOUBLE_EQ(found.scalars.at("largest_overlap"), expected);
+  EXPECT_GT(expected, 1.01 * over_largest) << "or this test says nothing";
+  EXPECT_NEAR(found.scalars.at("weight_over_area"), run.stage("settle").last.measures.weight / 4e-4, 1e-9);
 }
 
 TEST(Release, TheFreeBedComesToRest) {

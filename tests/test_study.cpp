@@ -146,6 +146,13 @@ TEST(StudyFile, ImpossibleCasesAreFoundBeforeAnyRun) {
   EXPECT_NE(base.find("nearest known key: count"), std::string::npos) << base;
 }
 
+TEST(StudyFile, AVariedReferenceNeedsTheSameValues) {
+  const std::string both = replaced("name = \"reference\"", "name = \"reference\"\nvary = { \"particles.law.friction\" = [0.3, 0.5] }", without_scan);
+  const std::string text = complaint(replaced("stiffness = [0, 1, 2]", "vary = { \"particles.law.friction\" = [0.3, 0.7] }", both), base_text);
+  EXPECT_NE(text.find("study.toml:10:1: curve.against: \"reference\" has no member with the varied values of \"coarse friction=0.7\""), std::string::npos) << text;
+  EXPECT_EQ(text.find("friction=0.3\""), std::string::npos) << text;
+}
+
 TEST(StudyFile, ShippedOnesAreRight) {
   int count = 0;
   for (const auto& entry : fs::directory_iterator(fs::path(PLATEN_SOURCE_DIR) / "protocol/studies")) {

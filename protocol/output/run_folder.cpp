@@ -59,11 +59,16 @@ void refuse_if_used(const fs::path& folder) {
   }
 }
 
-// `platen run case.toml -o . --force` must not replace the user's own case by one with overrides.
-void refuse_to_replace_case(const fs::path& folder, const std::string& case_text) {
-  const fs::path file = folder / "case.toml";
-  if (fs::exists(file) && !written_by_platen(folder) && read_whole_file(file) != case_text)
-    throw OutputError(file.string() + ": was not written by platen and is not overwritten; choose another folder (-o)");
+// `platen run case.toml -o . --force` must not replace the user's own case by one with overrides, nor other files of his that
+// have names of ours.
+void refuse_to_replace_foreign(const fs::path& folder, const std::string& case_text) {
+  if (written_by_platen(folder)) return;
+  const auto refuse = [](const fs::path& file) { throw OutputError(file.string() + ": was not written by platen and is not overwritten; choose another folder (-o)"); };
+  const fs::path own_case = folder / "case.toml";
+  if (fs::exists(own_case) && read_whole_file(own_case) != case_text) refuse(own_case);
+  for (const char* name : main_files)
+    if (fs::exists(folder / name) && folder / name != own_case) refuse(folder / name);
+  if (has_checkpoint(folder)) refuse(folder / "checkpoint.h5");
 }
 
 // The lock falls with the process, however it ends; the file itself stays, since removing it would let two processes
@@ -111,11 +116,11 @@ void remove_exports(const fs::path& folder) {
   if (fs::is_empty(folder)) fs::remove(folder);
 }
 
-// Removes what a former run left. Where no run was, only files go whose names this run needs.
+// Removes what a former run left.
 void remove_own_files(const fs::path& folder, bool former_run) {
-  for (const char* name : main_files) remove_file(folder / name);
-  remove_checkpoints(folder);  // always: `resume` must not take those of a former run for its own
   if (!former_run) return;
+  for (const char* name : main_files) remove_file(folder / name);
+  remove_checkpoints(folder);  // `resume` must not take those of a former run for its own
   for (const char* name : other_files) remove_file(folder / name);
   remove_exports(folder / "export");
   const fs::path frames = folder / "frames";
@@ -167,7 +172,7 @@ UniqueFd RunFolder::read_lock(const fs::path& folder) {
 
 RunFolder RunFolder::create(const fs::path& folder, const std::string& case_text, bool force) try {
   fs::create_directories(folder);
-  if (force) refuse_to_replace_case(folder, case_text);
+  if (force) refuse_to_replace_foreign(folder, case_text);
   else refuse_if_used(folder);
   const bool former_run = written_by_platen(folder);
   UniqueFd held = lock(folder);

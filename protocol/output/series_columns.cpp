@@ -60,7 +60,7 @@ constexpr std::array columns{
                  Kind::real, [](const SeriesRow& r) { return r.measures.ledger.sliding_dissipation; }},
     SeriesColumn{"rolling_dissipation", "J", "lost in rolling friction, since the run began", Kind::real,
                  [](const SeriesRow& r) { return r.measures.ledger.rolling_dissipation; }},
-    SeriesColumn{"plate_model_work", "J", "residual of the plates' total-form tangential spring, since the run began",
+    SeriesColumn{"plate_model_work", "J", "energy of tangential springs whose stiffness changes with overlap, work of no force, since the run began",
                  Kind::real, [](const SeriesRow& r) { return r.measures.ledger.plate_model_work; }},
     SeriesColumn{"plate_work", "J", "work of the moving plates on the bed, since the run began", Kind::real,
                  [](const SeriesRow& r) { return r.measures.ledger.plate_work; }},

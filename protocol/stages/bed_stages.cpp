@@ -10,13 +10,16 @@
 
 namespace platen {
 
-std::int64_t Stand::step_at(double stage_seconds) const {
-  return dt_step + std::max<std::int64_t>(0, std::llround((stage_seconds - dt_time) / sim.time_step()));
-}
+namespace {
+// Whole steps, none of the past; more than any run makes are as good as for ever.
+std::int64_t whole_steps(double steps) { return std::llround(std::clamp(steps, 0.0, 1e15)); }
+}  // namespace
+
+std::int64_t Stand::step_at(double stage_seconds) const { return dt_step + whole_steps((stage_seconds - dt_time) / sim.time_step()); }
 
 std::int64_t Stand::step_not_before(double stage_seconds) const {
   const double steps = (stage_seconds - dt_time) / sim.time_step();
-  return dt_step + std::max<std::int64_t>(0, std::llround(std::ceil(steps - 1e-6)));
+  return dt_step + whole_steps(std::ceil(steps - 1e-6));
 }
 
 std::string pretty(double value, const char* unit) {
@@ -46,7 +49,7 @@ std::string what_is_missing(const Stand& stand, const Measures& m) {
     if (until.strain && stand.strain_zero_height) parts.push_back(fmt::format("strain {:.2f} % (wanted: {:.2f})", 100.0 * (1.0 - m.height / *stand.strain_zero_height), 100.0 * *until.strain));
     if (until.strain && !stand.strain_zero_height) parts.push_back("strain has not begun to count");
     if (until.porosity) parts.push_back(fmt::format("porosity {:.3f} (wanted: {:.3f})", m.porosity, *until.porosity));
-    if (until.drop) parts.push_back(fmt::format("stress {}: no drop by {:.0f} % yet", pretty(m.stress_top, "Pa"), 100.0 * *until.drop));
+    if (until.drop) parts.push_back(fmt::format("stress {}: no drop by {:.0f} % yet of a peak above {}", pretty(m.stress_top, "Pa"), 100.0 * *until.drop, pretty(least_peak_of_drop * spec.strain_zero, "Pa")));
   }
   return fmt::format("{}", fmt::join(parts, "; "));
 }

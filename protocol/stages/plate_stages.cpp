@@ -166,7 +166,7 @@ void CrushStage::update(Stand& stand, const Look& look) {
   smooth.push_back(mean);
   const double strain = curve.back().strain;
   if (mean > peak) peak = mean, peak_strain = strain;
-  if (!stand.spec.until.drop || peak < 10.0 * stand.spec.strain_zero) return;
+  if (!stand.spec.until.drop || peak < least_peak_of_drop * stand.spec.strain_zero) return;
   if (mean >= (1.0 - *stand.spec.until.drop) * peak)
     low_since = std::numeric_limits<double>::quiet_NaN();
   else if (std::isnan(low_since))

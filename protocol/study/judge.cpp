@@ -117,7 +117,12 @@ void Judge::say(const std::string& figure, const std::string& text, const std::s
     const std::size_t own = std::set(curve.seeds.begin(), curve.seeds.end()).size();
     seeds = seeds ? std::min(*seeds, own) : own;
   };
-  for (const MeasuredCurve* curve : curves_) count(*curve);
+  for (const MeasuredCurve* curve : curves_) {
+    if (curve != nullptr)
+      count(*curve);
+    else
+      seeds = 0;
+  }
   if (curves_.empty())
     for (const MeasuredCurve& curve : part_.curves)
       if (!curve.runs.empty()) count(curve);

@@ -32,7 +32,7 @@ class Judge {
 
   const PartResults& part() const { return part_; }
 
-  // The same judge for statements on these curves alone, whose seeds are what is said beside them.
+  // The same judge for statements on these curves alone, the fewest seeds of which are what is said beside them; nullptr: none.
   Judge on(std::vector<const MeasuredCurve*> curves) const {
     Judge other = *this;
     other.curves_ = std::move(curves);

@@ -12,6 +12,7 @@
 #include "protocol/output/hdf5_file.h"
 #include "protocol/output/results_h5.h"
 #include "protocol/output/series_csv.h"
+#include "protocol/sphere_facts.h"
 #include "protocol/stages.h"
 #include "protocol/study/settled_sample.h"
 
@@ -129,17 +130,22 @@ Curve height_profile(const Hdf5Group& root, const std::string& stage) {
   return curve;
 }
 
-// Largest overlap that a contact still there has ever had, from its history: delta_p^n = (1 - k1/k2) delta_max^n, over 2 R.
+// Largest overlap that a contact still there has ever had, from its history: delta_p^n = (1 - k1/k2) delta_max^n, over the
+// diameter of its smaller sphere.
 double largest_overlap(const Hdf5Group& root, const Case& c) {
   if (!root.has("contacts")) return nan;
-  const Hdf5Group contacts = root.group("contacts");
+  const Hdf5Group contacts = root.group("contacts"), particles = root.group("particles");
   const PairLaw& law = c.particles.law;
-  double largest = 0.0;
-  for (const double delta : contacts.read<double>("overlap")) largest = std::max(largest, delta);
+  const std::vector<std::int64_t> ids = particles.read<std::int64_t>("id"), pairs = contacts.read<std::int64_t>("pair");
+  const std::vector<double> radii = particles.read<double>("radius"), overlaps = contacts.read<double>("overlap"), plastic = contacts.read<double>("plastic_overlap");
+  const auto radius_of = [&](std::int64_t id) { return radii[static_cast<std::size_t>(std::ranges::lower_bound(ids, id) - ids.begin())]; };
   const double kept = std::pow(1.0 - law.k1 / law.k2, 1.0 / law.exponent);
-  if (kept > 0.0)
-    for (const double delta_p : contacts.read<double>("plastic_overlap")) largest = std::max(largest, delta_p / kept);
-  return largest / (2.0 * c.particles.sizes.largest());
+  double largest = 0.0;
+  for (std::size_t k = 0; k < overlaps.size(); ++k) {
+    const double ever = kept > 0.0 ? std::max(overlaps[k], plastic[k] / kept) : overlaps[k];
+    largest = std::max(largest, ever / (2.0 * std::min(radius_of(pairs[2 * k]), radius_of(pairs[2 * k + 1]))));
+  }
+  return largest;
 }
 
 // Mean over the rows with an inertial number below 1e-4: only where loading is quasi-static do both plates tell the weight.
@@ -295,7 +301,7 @@ const std::vector<ScalarKind>& scalar_kinds() {
       {"inertial_peak", "-", "inertial number at the end of the compression"},
       {"quasi_static_stress", "Pa", "stress from which on the inertial number stays below 1e-4"},
       {"largest_overlap", "-",
-       "largest overlap of the contacts left at the end, over the diameter, from their history"},
+       "largest overlap of the contacts left at the end, over the diameter of the smaller sphere, from their history"},
   };
   return kinds;
 }
@@ -307,12 +313,7 @@ RunMeasures measure_run(const std::filesystem::path& folder, const Case& c, std:
   if (!fill.empty()) put(out, "porosity_filled", fill.porosity.back());
   measure_compression(series, c, strain_zero, out);
   measure_crush(series, c, out);
-  if (c.particles.sizes.kind == SizeDistribution::Kind::mono && c.box.given) {
-    const double R = c.particles.sizes.radius;
-    put(out, "weight_over_area",
-        static_cast<double>(c.particles.count) * 4.0 / 3.0 * std::numbers::pi * R * R * R * c.particles.density *
-            c.gravity / (c.box.width * c.box.depth));
-  }
+  if (c.box.given) put(out, "weight_over_area", sphere_facts(c).mass_total * c.gravity / (c.box.width * c.box.depth));
   const auto results = Hdf5File::open(folder / "results.h5");
   out.curves["porosity_height"] = height_profile(results.root(), first_stage(c, StageKind::compress));
   put(out, "largest_overlap", largest_overlap(results.root(), c));

@@ -286,8 +286,11 @@ class Planner {
         });
         if (other.block == wanted && agrees) found.push_back(k);
       }
-      if (found.empty()) continue;  // the block itself was wrong and has been reported
-      curve.reference = found.front();
+      if (!found.empty()) {
+        curve.reference = found.front();
+      } else if (std::any_of(part.curves.begin(), part.curves.end(), [&](const PlannedCurve& other) { return other.block == wanted; })) {
+        problem(spec.where, "curve.against", fmt::format("\"{}\" has no member with the varied values of \"{}\"; allowed: a block that varies these keys over the same values, or not at all", wanted, curve.label));
+      }  // else the block itself was wrong and has been reported
     }
   }
 

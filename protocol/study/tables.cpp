@@ -262,6 +262,16 @@ void write_statements(const fs::path& folder, const std::vector<Statement>& stat
   write_whole_file(folder / "statements.csv", text);
 }
 
+// The group of a part in study.h5: its name, unless the file has another use for that.
+std::string part_group(const std::string& name, const StudyPlan& plan) {
+  std::string group = name == "study" ? "part" : name == "statements" ? "part-statements" : name;
+  const auto taken = [&] {
+    return group != name && std::any_of(plan.study->parts.begin(), plan.study->parts.end(), [&](const Study& part) { return part.name == group; });
+  };
+  while (taken()) group += "-";
+  return group;
+}
+
 void write_study_h5(const fs::path& folder, const StudyPlan& plan, const std::vector<PartResults>& results,
                     const std::vector<Statement>& statements) {
   Hdf5File file = Hdf5File::create(folder / "study.h5");
@@ -271,7 +281,7 @@ void write_study_h5(const fs::path& folder, const StudyPlan& plan, const std::ve
     root.attribute("version", PLATEN_VERSION);
     root.write_text("study", plan.study->text, {"-", "the study (TOML) with overrides applied"});
     for (const PartResults& part : results) {
-      Hdf5Group group = root.create_group(part.plan->study->name == "study" ? "part" : part.plan->study->name);
+      Hdf5Group group = root.create_group(part_group(part.plan->study->name, plan));
       group.attribute("reference_radius", part.plan->reference_radius);
       Hdf5Group curves = group.create_group("curves");
       for (const MeasuredCurve& curve : part.curves)
