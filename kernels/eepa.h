@@ -5,7 +5,7 @@
 //   f_hys = f0 + k2 (s - s_p)                                  [Eq. 2]
 //   limit = mu |k2 (s - s_p) + k_adh s|                        [Eq. 10, A11]; or mu |f_hys|, where a case asks for it
 //   K1    = n k1 delta^(n-1);  k_t = ratio K1                  [A8]
-//   beta_n^2 = 4 z (n+1)/(2n) m* K1;  beta_t^2 = ratio beta_n^2   [Eq. 4, 7, A8]
+//   beta_n^2 = 4 z (n+1)/(2n) m* K1;  beta_t^2 = ratio beta_n^2   [Eq. 4, 9, A8]
 #pragma once
 
 #include "kernels/five_thirds.h"

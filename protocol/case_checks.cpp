@@ -5,9 +5,11 @@
 
 #include <fmt/format.h>
 
+#include "core/particles.h"
 #include "protocol/case_sections.h"
 #include "protocol/particle_file.h"
 #include "protocol/sphere_facts.h"
+#include "protocol/stages/draw_radii.h"
 #include "protocol/stages/rain.h"
 
 namespace platen {
@@ -25,6 +27,24 @@ std::string rain_problem(const Case& c, const StageSpec& rain) {
     return fmt::format("duration = {:g} s makes a column of spheres above 1000 times as high as the box; allowed: at most {:.3g} s, or a smaller drop_speed",
                        *rain.duration, std::max(most, least));
   return "";
+}
+
+// Spheres that are grown need a bed as high as the largest of them. Draws no more of them than it takes to know.
+std::string grow_problem(const Case& c, double porosity) {
+  const SizeDistribution& sizes = c.particles.sizes;
+  const double floor = c.box.width * c.box.depth * (1.0 - porosity);
+  RandomSource random(c.seed);
+  double height = 0.0, largest = 0.0;
+  if (sizes.kind == SizeDistribution::Kind::mono) {
+    height = solid_volume(c) / floor, largest = sizes.radius;
+  } else {
+    for (std::int64_t k = 0; k < c.particles.count && height < 2.001 * sizes.largest(); ++k) {
+      const double R = draw_radius(sizes, random);
+      height += sphere_mass(R, 1.0) / floor, largest = std::max(largest, R);
+    }
+  }
+  if (height >= 2.001 * largest) return "";
+  return fmt::format("{} spheres make a bed of {:.4g} m, less than a diameter; allowed: beds of {:.4g} m and more, by more spheres or a smaller width or depth", c.particles.count, height, 2.001 * largest);
 }
 
 bool any_stage(const Case& c, const CaseFacts& facts, StageKind kind) {
@@ -79,7 +99,7 @@ void check_box(const Case& c, const CaseFacts& facts, Problems& problems) {
                    fmt::format("{:.6g} m is too narrow for a periodic box, a sphere would meet itself or one "
                                "partner twice; allowed: >= 4 R_max + 2 skin = {:.6g} m (R_max = {:.6g} m)",
                                length, narrowest, R_max));
-    } else {
+    } else if (c.box.sides == Sides::walls || !facts.has_file) {
       problems.add(where, key,
                    fmt::format("{:.6g} m is narrower than the largest sphere; allowed: >= 2 R_max = {:.6g} m (R_max = {:.6g} m)", length,
                                narrowest, R_max));
@@ -121,10 +141,8 @@ void check_stages(const Case& c, const CaseFacts& facts, Problems& problems) {
         refuse("fill needs [box], the region to fill; allowed: [box] with width, depth, height");
       } else if (stage.method == FillMethod::grow && facts.box_present && sides == Sides::open) {
         refuse("fill by growth needs closed sides; allowed: box.sides = \"periodic\" or \"walls\"");
-      } else if (stage.method == FillMethod::grow && stage.porosity && facts.has_count && facts.sizes_good && facts.width_good && facts.depth_good) {
-        const double height = solid_volume(c) / (c.box.width * c.box.depth * (1.0 - *stage.porosity)), least = 2.001 * c.particles.sizes.largest();
-        if (height < least)
-          refuse(fmt::format("{} spheres make a bed of {:.4g} m, less than a diameter; allowed: beds of {:.4g} m and more, by more spheres or a smaller width or depth", c.particles.count, height, least));
+      } else if (stage.method == FillMethod::grow && stage.porosity && facts.has_count && c.particles.count > 0 && facts.sizes_good && facts.width_good && facts.depth_good) {
+        if (const std::string problem = grow_problem(c, *stage.porosity); !problem.empty()) refuse(problem);
       }
     }
     if (stage.kind == StageKind::release) {

@@ -99,6 +99,9 @@ TEST(CaseStages, ABedMustHaveRoomForASphere) {
   };
   const std::vector<std::string> grown{"stage.fill.method=\"grow\"", "stage.fill.porosity=0.4", "particles.count=50", "box.width=\"150 mm\"", "box.depth=\"50 mm\""};
   EXPECT_NE(complaint(grown).find("50 spheres make a bed of 0.0007272 m, less than a diameter"), std::string::npos) << complaint(grown);
+  // What counts is the largest sphere that is drawn, not the largest that could be.
+  EXPECT_NO_THROW(parse_case(test::replaced("radius = \"2.5 mm\"", "sizes = { kind = \"lognormal\", median = \"2 mm\", sigma = 0.3, min = \"1 mm\", max = \"14 mm\" }"), "case.toml", ".",
+                             {"stage.fill.method=\"grow\"", "stage.fill.porosity=0.45", "particles.count=150", "box.sides=\"walls\"", "box.width=\"28 mm\"", "box.depth=\"28 mm\""}));
   const std::vector<std::string> open{"box.sides=\"open\"", "box.width=\"4 mm\""};
   EXPECT_NE(complaint(open).find("box.width: 0.004 m is narrower than the largest sphere"), std::string::npos) << complaint(open);
 }

@@ -184,17 +184,31 @@ TEST_F(Output, SummaryOfAFailedRunHasNoHash) {
 }
 
 TEST_F(Output, ForceLeavesWhatNoRunWrote) {
-  for (const char* name : {"results.h5", "series.csv", "checkpoint.h5", "case.toml"}) {
+  for (const char* name : {"results.h5", "series.csv", "checkpoint.prev.h5", "case.toml", "frames.hdf.series"}) {
     const fs::path folder = root / (std::string("mine-") + name);
     fs::create_directories(folder);
     write_whole_file(folder / name, "mine");
     EXPECT_THROW(RunFolder::create(folder, case_text, true), OutputError) << name;
     EXPECT_EQ(contents(folder / name), "mine");
   }
+  fs::create_directories(root / "framed/frames");
+  write_whole_file(root / "framed/frames/1.hdf", "mine");
+  EXPECT_THROW(RunFolder::create(root / "framed", case_text, true), OutputError);
+  // Neither does a resume that finds no run make it one.
+  write_whole_file(root / "mine-results.h5/case.toml", case_text);
+  EXPECT_THROW(RunFolder::hold(root / "mine-results.h5"), OutputError);
+  EXPECT_FALSE(fs::exists(root / "mine-results.h5/.lock"));
   // The case itself may stand there, and what a run wrote goes.
   fs::create_directories(root / "here");
   write_whole_file(root / "here/case.toml", case_text);
   { RunFolder run = RunFolder::create(root / "here", case_text, true); }
+  write_whole_file(root / "here/results.h5", "of a run");
+  RunFolder::create(root / "here", case_text, true);
+  EXPECT_FALSE(fs::exists(root / "here/results.h5"));
+  // A copy without its lock is known by its log.
+  write_whole_file(root / "here/results.h5", "of a run");
+  { RunFolder run = RunFolder::create(root / "here", case_text, true); run.log("start", {}); }
+  fs::remove(root / "here/.lock");
   write_whole_file(root / "here/results.h5", "of a run");
   RunFolder::create(root / "here", case_text, true);
   EXPECT_FALSE(fs::exists(root / "here/results.h5"));

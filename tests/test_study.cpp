@@ -151,6 +151,8 @@ TEST(StudyFile, AVariedReferenceNeedsTheSameValues) {
   const std::string text = complaint(replaced("stiffness = [0, 1, 2]", "vary = { \"particles.law.friction\" = [0.3, 0.7] }", both), base_text);
   EXPECT_NE(text.find("study.toml:10:1: curve.against: \"reference\" has no member with the varied values of \"coarse friction=0.7\""), std::string::npos) << text;
   EXPECT_EQ(text.find("friction=0.3\""), std::string::npos) << text;
+  const std::string plain = complaint(both, base_text);
+  EXPECT_NE(plain.find("\"reference\" varies keys that \"coarse a=0\" does not"), std::string::npos) << plain;
 }
 
 TEST(StudyFile, ShippedOnesAreRight) {

@@ -48,8 +48,14 @@ bool holds_run(const fs::path& folder) {
   return false;
 }
 
-// Every run leaves its lock behind.
-bool written_by_platen(const fs::path& folder) { return fs::exists(folder / lock_name); }
+// Every run leaves its lock behind, which copies of a folder may lack; its log begins alike.
+bool written_by_platen(const fs::path& folder) {
+  if (fs::exists(folder / lock_name)) return true;
+  const fs::path log = folder / "log.jsonl";
+  return fs::is_regular_file(log) && read_whole_file(log).starts_with("{\"timestamp\":\"");
+}
+
+bool is_frame(const fs::path& file) { return file.extension() == ".hdf" || file.string().ends_with(".hdf.tmp"); }
 
 void refuse_if_used(const fs::path& folder) {
   for (const auto& entry : fs::directory_iterator(folder)) {
@@ -63,12 +69,16 @@ void refuse_if_used(const fs::path& folder) {
 // have names of ours.
 void refuse_to_replace_foreign(const fs::path& folder, const std::string& case_text) {
   if (written_by_platen(folder)) return;
-  const auto refuse = [](const fs::path& file) { throw OutputError(file.string() + ": was not written by platen and is not overwritten; choose another folder (-o)"); };
+  const auto refuse = [](const fs::path& file) { throw OutputError(file.string() + ": was not written by platen, as no lock and no log of a run stand beside it, and is not overwritten; choose another folder (-o)"); };
   const fs::path own_case = folder / "case.toml";
   if (fs::exists(own_case) && read_whole_file(own_case) != case_text) refuse(own_case);
   for (const char* name : main_files)
     if (fs::exists(folder / name) && folder / name != own_case) refuse(folder / name);
-  if (has_checkpoint(folder)) refuse(folder / "checkpoint.h5");
+  if (fs::exists(folder / "frames.hdf.series")) refuse(folder / "frames.hdf.series");
+  if (has_checkpoint(folder)) refuse(folder / (fs::exists(folder / "checkpoint.h5") ? "checkpoint.h5" : "checkpoint.prev.h5"));
+  if (fs::is_directory(folder / "frames"))
+    for (const auto& entry : fs::directory_iterator(folder / "frames"))
+      if (is_frame(entry.path())) refuse(entry.path());
 }
 
 // The lock falls with the process, however it ends; the file itself stays, since removing it would let two processes
@@ -127,8 +137,7 @@ void remove_own_files(const fs::path& folder, bool former_run) {
   if (!fs::is_directory(fs::symlink_status(frames))) return;
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(frames)) {
-    const std::string name = entry.path().filename().string();
-    if (name.ends_with(".hdf") || name.ends_with(".hdf.tmp")) files.push_back(entry.path());
+    if (is_frame(entry.path())) files.push_back(entry.path());
   }
   for (const fs::path& file : files) fs::remove(file);
   if (fs::is_empty(frames)) fs::remove(frames);
@@ -188,7 +197,8 @@ RunFolder RunFolder::create(const fs::path& folder, const std::string& case_text
 }
 
 UniqueFd RunFolder::hold(const fs::path& folder) {
-  if (!fs::exists(folder / "case.toml")) throw OutputError(folder.string() + ": holds no run");
+  // Without one of these there was no run, and the lock that is left behind would say that there was.
+  if (!fs::exists(folder / "case.toml") || !(written_by_platen(folder) || has_checkpoint(folder) || fs::exists(folder / "summary.json"))) throw OutputError(folder.string() + ": holds no run");
   return lock(folder);
 }
 

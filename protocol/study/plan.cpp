@@ -286,10 +286,13 @@ class Planner {
         });
         if (other.block == wanted && agrees) found.push_back(k);
       }
-      if (!found.empty()) {
+      const bool several = std::any_of(found.begin(), found.end(), [&](std::size_t k) { return part.curves[k].varied != part.curves[found.front()].varied; });
+      if (several) {
+        problem(spec.where, "curve.against", fmt::format("\"{}\" varies keys that \"{}\" does not, so that several of its members would do; allowed: a block that varies the same keys, or none", wanted, curve.label));
+      } else if (!found.empty()) {
         curve.reference = found.front();
       } else if (std::any_of(part.curves.begin(), part.curves.end(), [&](const PlannedCurve& other) { return other.block == wanted; })) {
-        problem(spec.where, "curve.against", fmt::format("\"{}\" has no member with the varied values of \"{}\"; allowed: a block that varies these keys over the same values, or not at all", wanted, curve.label));
+        problem(spec.where, "curve.against", fmt::format("\"{}\" has no member with the varied values of \"{}\"; allowed: a block that varies these keys over the same values, written alike, or not at all", wanted, curve.label));
       }  // else the block itself was wrong and has been reported
     }
   }
