@@ -35,13 +35,9 @@ std::string grow_problem(const Case& c, double porosity) {
   const double floor = c.box.width * c.box.depth * (1.0 - porosity);
   RandomSource random(c.seed);
   double height = 0.0, largest = 0.0;
-  if (sizes.kind == SizeDistribution::Kind::mono) {
-    height = solid_volume(c) / floor, largest = sizes.radius;
-  } else {
-    for (std::int64_t k = 0; k < c.particles.count && height < 2.001 * sizes.largest(); ++k) {
-      const double R = draw_radius(sizes, random);
-      height += sphere_mass(R, 1.0) / floor, largest = std::max(largest, R);
-    }
+  for (std::int64_t k = 0; k < c.particles.count && height < 2.001 * sizes.largest(); ++k) {
+    const double R = draw_radius(sizes, random);
+    height += sphere_mass(R, 1.0) / floor, largest = std::max(largest, R);
   }
   if (height >= 2.001 * largest) return "";
   return fmt::format("{} spheres make a bed of {:.4g} m, less than a diameter; allowed: beds of {:.4g} m and more, by more spheres or a smaller width or depth", c.particles.count, height, 2.001 * largest);

@@ -117,6 +117,16 @@ TEST(Judge, TakesAnUnscaledBedWithKeysOfItsOwnWhereThereIsNoPlainOne) {
   EXPECT_EQ(holds(false, false, 1.5), std::nullopt) << "none at all";
 }
 
+// A curve all of whose runs found the same.
+MeasuredCurve alike(const PlannedCurve& curve, const std::vector<std::uint64_t>& seeds, const std::map<std::string, double>& scalars) {
+  MeasuredCurve measured;
+  measured.planned = &curve, measured.seeds = seeds;
+  RunMeasures run;
+  run.scalars = scalars;
+  measured.runs.assign(seeds.size(), run);
+  return measured;
+}
+
 // One curve of three lost a seed: that is said beside what it is in, and nowhere else.
 TEST(Judge, SeedsAreThoseOfTheCurvesThatAStatementIsOn) {
   Study study;
@@ -133,16 +143,7 @@ TEST(Judge, SeedsAreThoseOfTheCurvesThatAStatementIsOn) {
     curve.label = curve.block = name, curve.radius = 2e-3;
     planned.curves.push_back(curve);
   }
-  for (const PlannedCurve& curve : planned.curves) {
-    MeasuredCurve measured;
-    measured.planned = &curve, measured.seeds = seeds.at(curve.label);
-    for (std::size_t k = 0; k < measured.seeds.size(); ++k) {
-      RunMeasures run;
-      run.scalars = {{"strain_peak", 0.1}, {"strength", 1e4}};
-      measured.runs.push_back(run);
-    }
-    part.curves.push_back(measured);
-  }
+  for (const PlannedCurve& curve : planned.curves) part.curves.push_back(alike(curve, seeds.at(curve.label), {{"strain_peak", 0.1}, {"strength", 1e4}}));
   std::vector<Statement> said;
   Judge judge(part, said);
   judge_like_reference(judge);
@@ -166,17 +167,10 @@ TEST(Judge, SeedsOfFiguresAreThoseOfTheirCurves) {
     curve.label = curve.block = spec.name, curve.radius = radius, curve.powers.stiffness = 1.0, curve.powers.adhesion = 2.0;
     planned.curves.push_back(curve);
   }
-  for (const PlannedCurve& curve : planned.curves) {
-    MeasuredCurve measured;
-    measured.planned = &curve, measured.seeds = seeds.at(curve.radius);
-    for (std::size_t k = 0; k < measured.seeds.size(); ++k) {
-      RunMeasures run;
-      run.scalars = {{"strain_peak", 0.1}, {"strength", 1e4}, {"initial_stiffness", 1e5}, {"porosity_start", 0.4}, {"porosity_peak", 0.39}, {"porosity_at_zero", 0.4},
-                     {"coordination_peak", 6.0}, {"coordination_unloaded", 6.0}, {"coordination_released", 5.0}};
-      measured.runs.push_back(run);
-    }
-    part.curves.push_back(measured);
-  }
+  for (const PlannedCurve& curve : planned.curves)
+    part.curves.push_back(alike(curve, seeds.at(curve.radius),
+                                {{"strain_peak", 0.1}, {"strength", 1e4}, {"initial_stiffness", 1e5}, {"porosity_start", 0.4}, {"porosity_peak", 0.39}, {"porosity_at_zero", 0.4},
+                                 {"coordination_peak", 6.0}, {"coordination_unloaded", 6.0}, {"coordination_released", 5.0}}));
   std::vector<Statement> said;
   Judge judge(part, said);
   judge_figures_12_14(judge);
