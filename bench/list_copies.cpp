@@ -67,6 +67,7 @@ PairBatch BatchCopy::pairs(const StateCopy& state) {
   b.sum = sum.data();
   b.first = first, b.count = padded, b.end = first + count;
   b.spare = static_cast<std::int32_t>(sum.size() * sizeof(double)) - spare_records * record_bytes;
+  b.dense = true;
   b.leap = std::numeric_limits<double>::infinity();  // every listed pair goes through the law
   b.x = state.x.data(), b.y = state.y.data(), b.z = state.z.data();
   b.vx = state.vx.data(), b.vy = state.vy.data(), b.vz = state.vz.data();

@@ -35,6 +35,15 @@ PLATEN_INLINE ActiveVectors active_vectors(const Chunk<scene>& chunk, const Pair
   return active;
 }
 
+// All vectors of a chunk of `count` pairs.
+template <class I>
+PLATEN_INLINE ActiveVectors all_vectors(int count) {
+  ActiveVectors all;
+  for (int at = 0; at < count; at += I::width) all.at[all.count++] = at;
+  all.pairs = count;
+  return all;
+}
+
 // The active pairs of a chunk drawn together, where they would fill half as many vectors or fewer: columns move to the
 // front of the chunk, history and indices into arrays of their own, which `view` shows to law and output. What is left
 // out is apart, was apart and has no history, so it has no force and stays as it is.

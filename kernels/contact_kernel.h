@@ -21,13 +21,17 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
   Chunk<scene> chunk;
   GatheredPairs<Wide, scene> gathered;
   typename I::Real shortest_lever = I::set(1.0);
+  ActiveVectors active;
   for (std::int32_t start = 0; start < b.count; start += chunk_size) {
     const int count = start + chunk_size < b.count ? chunk_size : b.count - start;
     if (c.width > 0.0)
       for (int at = 0; at < count; at += I::width) fetch_geometry<I, scene, exact, true>(chunk, at, b, c, start + at);
     else
       for (int at = 0; at < count; at += I::width) fetch_geometry<I, scene, exact, false>(chunk, at, b, c, start + at);
-    ActiveVectors active = active_vectors<Wide, scene>(chunk, b, count);
+    if (!b.dense)
+      active = active_vectors<Wide, scene>(chunk, b, count);
+    else if (active.pairs != count)
+      active = all_vectors<Wide>(count);
     const bool few = GatheredPairs<Wide, scene>::worth(active);
     if (few) {
       gathered.take(chunk, b, start, active);

@@ -143,7 +143,7 @@ PLATEN_INLINE void forces_of_pairs(Chunk<scene>& chunk, int at, const PairBatch&
   // to each side: F, T = lever n x F_t; rolling [Eq. 11, A12-A14]
   // Masked last: padding has no distance, and what it computes is not a number.
   const Vec3<I> n = pairs.n();
-  const Vec3<I> F = where<I>(touching, add_scaled<I>(F_t, pairs.f_n(), n), none);
+  const Vec3<I> F = rounded_by_law<I>(where<I>(touching, add_scaled<I>(F_t, pairs.f_n(), n), none), c.force);
   chunk.template put<I>(chunk.F, at, F);
   const Vec3<I> turn = minus_cross(n, F_t);
   const Real lever_i = pairs.lever(0);
@@ -162,9 +162,9 @@ PLATEN_INLINE void forces_of_pairs(Chunk<scene>& chunk, int at, const PairBatch&
       T_j = add_scaled<I>(T_j, -(I::set(1.0) / R_j), M);
       if constexpr (scene.energy) sums.add(&Energy::rolling, zero - dot(M, pairs.w()) * I::set(c.dt), c);
     }
-    chunk.template put<I>(chunk.T[1], at, T_j);
+    chunk.template put<I>(chunk.T[1], at, rounded_by_law<I>(T_j, c.force));
   }
-  chunk.template put<I>(chunk.T[0], at, T_i);
+  chunk.template put<I>(chunk.T[0], at, rounded_by_law<I>(T_i, c.force));
 }
 
 // Calls visit(term, value) for each energy that pairs of a scene have at all.

@@ -11,7 +11,7 @@ PLATEN_INLINE double* record_at(double* sum, std::int32_t bytes) {
   return reinterpret_cast<double*>(reinterpret_cast<char*>(sum) + bytes);
 }
 
-// Rounds the contributions, turns them into records and adds them up: the owner's by a sum carried from contact to
+// Rounds what the law has not rounded, turns contributions into records and adds them up: the owner's by a sum carried from contact to
 // contact (consecutive contacts share owners), the partner's in its place. What is carried goes to the owner's place when the
 // next owner's first contact comes; before, to a spare record, since a branch would be foreseen too rarely.
 template <class I, SceneTraits scene>
@@ -21,7 +21,8 @@ PLATEN_INLINE void output_pairs(const Chunk<scene>& chunk, int at, const PairBat
   for (int side = 0; side < Chunk<scene>::sides; ++side) {
     typename I::Real fields[8];
     chunk.template take_fields<I>(at, side, fields);
-    for (int field = 0; field < 7; ++field) fields[field] = rounded<I>(fields[field], c.force);
+    for (int field = 0; field < 7; ++field)
+      if (!interleaved<I> || field == 3) fields[field] = rounded<I>(fields[field], c.force);  // the others: rounded_by_law
     I::to_records(fields, records[side]);
   }
   for (int lane = 0; lane < I::width; ++lane) {

@@ -1,7 +1,8 @@
 // Contributions rounded so that their sums do not depend on order.
 #pragma once
 
-#include "kernels/real.h"
+#include "kernels/twice.h"
+#include "kernels/vec3.h"
 #include "kernels/views.h"
 
 namespace platen {
@@ -10,6 +11,16 @@ template <class I>
 PLATEN_INLINE typename I::Real rounded(typename I::Real x, const Quantum& q) {
   const typename I::Real magic = I::set(q.magic);
   return (x + magic) - magic;
+}
+
+// Forces are rounded by the law where that works on two vectors at once: its multiplications leave the units idle that add, which
+// the output phase keeps busy. Elsewhere the law has no register left for it, and the output phase does it.
+template <class I>
+PLATEN_INLINE Vec3<I> rounded_by_law(const Vec3<I>& a, const Quantum& q) {
+  if constexpr (interleaved<I>)
+    return {rounded<I>(a.x, q), rounded<I>(a.y, q), rounded<I>(a.z, q)};
+  else
+    return a;
 }
 
 }  // namespace platen

@@ -5,6 +5,8 @@
 // fill these waits. Each half does what it would do alone, so no bit changes.
 #pragma once
 
+#include <type_traits>
+
 #include "kernels/real.h"
 
 namespace platen {
@@ -96,5 +98,9 @@ struct Interleaved<Avx512> {
   using Type = Twice<Avx512>;
 };
 #endif
+
+// Whether the law of this instruction set works on two vectors at once; I: a single vector, or two.
+template <class I>
+inline constexpr bool interleaved = !std::is_same_v<typename Interleaved<typename SingleOf<I>::Type>::Type, typename SingleOf<I>::Type>;
 
 }  // namespace platen
