@@ -5,17 +5,21 @@
 //   contacts/<isa>/<scene>/<list>    one pass over the pairs of the list; time step 0, so the state stays what it is
 //   motion/<isa>/<spheres>/<list>    kick, drift, rows
 //   plates/<isa>                     the spheres near the bottom plate
+//   phases/<isa>/<scene>/<phase>     one phase of the contact kernel, sixteen times on each chunk of a list in the second cache: what it
+//                                    takes once its numbers are in the first (manual time; ns for eight contacts)
 //   unguarded/..., guarded/...       the first two without and with the guards (forces, overlaps, energies, velocities in
 //                                    range): their cost is the difference
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <map>
 
 #include "bench/beds.h"
+#include "bench/kernel_phases.h"
 #include "bench/list_copies.h"
 #include "bench/reference_loops.h"
 #include "bench/unguarded.h"
@@ -104,6 +108,24 @@ void contacts(benchmark::State& state, InstructionSet set, const BenchScene& sce
   state.counters["listed/contact"] = static_cast<double>(l.used) / static_cast<double>(touching);
 }
 
+void phase(benchmark::State& state, InstructionSet set, const BenchScene& scene, PhasePass pass, Phase which) {
+  Lists& l = lists(set, scene, List::l2);
+  const FloatMode mode;
+  LawConstants law = l.sim->law();
+  law.dt = 0.0;
+  BatchCopy& b = l.batches.front();
+  const auto seconds = [&](int times) {
+    std::memset(b.sum.data(), 0, b.sum.size() * sizeof(double));
+    const auto start = std::chrono::steady_clock::now();
+    pass(b.pairs(l.state), law, which, times);
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  };
+  constexpr int times = 16;
+  for (auto _ : state) state.SetIterationTime(std::max(1e-9, (seconds(times + 1) - seconds(1)) / times));
+  const double eights = static_cast<double>(b.padded / chunk_size) * (chunk_size / 8);
+  state.counters["ns/8"] = benchmark::Counter(1e-9 * eights * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+}
+
 void motion(benchmark::State& state, InstructionSet set, const BenchScene& scene, List list, decltype(KernelTable::motion) kernel) {
   Lists& l = lists(set, scene, list);
   if (kernel == nullptr) kernel = l.sim->kernels().motion;
@@ -162,6 +184,13 @@ void add_all() {
             fmt::format("motion/{}/{}/{}", to_string(set), name, list_names[static_cast<int>(list)]).c_str(), motion,
             set, bench_scene(name), list, nullptr);
     benchmark::RegisterBenchmark(fmt::format("plates/{}", to_string(set)).c_str(), plates, set);
+    if (const PhasePasses passes = phase_passes(set); passes.full != nullptr)
+      for (const auto& [name, pass] : {std::pair{"full", passes.full}, std::pair{"linear", passes.linear}})
+        for (const Phase which : {Phase::geometry, Phase::active, Phase::motion, Phase::springs, Phase::forces, Phase::output})
+          benchmark::RegisterBenchmark(fmt::format("phases/{}/{}/{}", to_string(set), name, phase_names[static_cast<int>(which)]).c_str(), phase, set,
+                                       bench_scene(name), pass, which)
+              ->UseManualTime()
+              ->MinTime(0.02);  // of the difference, behind which stands thirty times as much
     if (const UnguardedKernels bare = unguarded_kernels(set); bare.contacts != nullptr) {
       const BenchScene full = bench_scene("full");
       benchmark::RegisterBenchmark(fmt::format("guarded/contacts/{}/L1", to_string(set)).c_str(), contacts, set, full, List::l1, nullptr);

@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 #include <vector>
 
+#include "core/simulation.h"
 #include "kernels/active_pairs.h"
 #include "kernels/twice.h"
+#include "tests/scenes.h"
 
 namespace platen {
 namespace {
@@ -135,6 +138,61 @@ TEST(ActivePairs, RunsOfOneOwnerAmongThem) {
     EXPECT_EQ(again_of(view.to[n]), again[n] ? 0xff : 0);
     EXPECT_EQ(last_of(view.to[n]), record_bytes * (before[n] < 0 ? 900 + n % spare_records : before[n] - 100));
   }
+}
+
+template <class T>
+std::vector<T> copied(const AlignedArray<T>& from) { return {from.begin(), from.end()}; }
+
+// One pass over a batch whose lists are so wide that most pairs are apart.
+struct Pass {
+  std::vector<double> history, sums;
+  PairTotals totals;
+  bool operator==(const Pass& o) const {
+    return history == o.history && sums == o.sums && totals.contacts == o.totals.contacts && totals.out_of_range == o.totals.out_of_range &&
+           std::equal(std::begin(totals.energy), std::end(totals.energy), std::begin(o.totals.energy));
+  }
+};
+Pass pass(const Simulation& sim, bool dense) {
+  const Batch& b = sim.batches().front();
+  const Particles& p = sim.state();
+  AlignedArray<double> sp, tx, ty, tz, k_t, sum;
+  const auto take = [](AlignedArray<double>& to, const AlignedArray<double>& from) { to.resize(from.size()), std::copy(from.begin(), from.end(), to.begin()); };
+  take(sp, b.sp), take(tx, b.tx), take(ty, b.ty), take(tz, b.tz), take(k_t, b.k_t_last);
+  sum.assign(b.sum.size(), 0.0);
+  LawConstants law = sim.law();
+  law.dt = sim.time_step();
+  const auto spare = static_cast<std::int32_t>(sum.size() * sizeof(double)) - spare_records * record_bytes;
+  const PairBatch pairs{p.rows.data(), b.i.data(), b.row_j.data(), b.to.data(), sp.data(), tx.data(), ty.data(), tz.data(), k_t.empty() ? nullptr : k_t.data(),
+                        sum.data(), b.first, b.padded, b.first + b.count, spare, dense, sim.leap_of(b, law.dt),
+                        p.x.data(), p.y.data(), p.z.data(), p.vx.data(), p.vy.data(), p.vz.data(), p.ux.data(), p.uy.data(), p.uz.data()};
+  Pass found;
+  sim.kernels().contacts(pairs, law, found.totals);
+  for (const auto* column : {&sp, &tx, &ty, &tz, &k_t}) found.history.insert(found.history.end(), column->begin(), column->end());
+  found.sums = copied(sum);
+  found.sums.resize(found.sums.size() - spare_records * record_size);  // what is in those means nothing
+  return found;
+}
+
+TEST(ActivePairs, WhetherTheyAreLookedForChangesNoBit) {
+  for (const InstructionSet set : available_instruction_sets())
+    for (const scenes::LawCase& c : scenes::laws_of_scenes()) {
+      SCOPED_TRACE(std::string(to_string(set)) + ", " + c.name);
+      EngineOptions engine;
+      engine.instruction_set = set;
+      engine.batch = 4096;
+      scenes::BedOptions bed;
+      bed.nx = bed.ny = 6, bed.spacing = 2.02 * (1.0 - 0.7 * c.spread), bed.spread = c.spread;  // some touch, most do not
+      engine.inner_gap = 0.9 * bed.R;
+      Simulation sim(scenes::bed(bed, c.law, engine));
+      sim.set_time_step(1e-5);
+      sim.advance(40);
+      const Batch& b = sim.batches().front();
+      const Pass all = pass(sim, true), chosen = pass(sim, false);
+      ASSERT_EQ(sim.batches().size(), 1u);
+      EXPECT_GT(all.totals.contacts, 0);
+      EXPECT_LT(2 * all.totals.contacts, b.used);
+      EXPECT_TRUE(all == chosen);
+    }
 }
 
 }  // namespace
