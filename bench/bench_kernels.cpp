@@ -6,17 +6,20 @@
 //   motion/<isa>/<spheres>/<list>    kick, drift, rows
 //   plates/<isa>                     the spheres near the bottom plate
 //   phases/<isa>/<scene>/<phase>     one phase of the contact kernel, sixteen times on each chunk of a list in the second cache: what it
-//                                    takes once its numbers are in the first (manual time; ns for eight contacts)
+//                                    takes once its numbers are in the first (manual time; ns for eight contacts); `active` is no
+//                                    part of contacts/..., whose lists count as dense
 //   unguarded/..., guarded/...       the first two without and with the guards (forces, overlaps, energies, velocities in
 //                                    range): their cost is the difference
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <map>
+#include <utility>
 
 #include "bench/beds.h"
 #include "bench/kernel_phases.h"
@@ -121,9 +124,11 @@ void phase(benchmark::State& state, InstructionSet set, const BenchScene& scene,
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   };
   constexpr int times = 16;
+  // A difference that noise makes negative counts as next to nothing, or the library would never end.
   for (auto _ : state) state.SetIterationTime(std::max(1e-9, (seconds(times + 1) - seconds(1)) / times));
   const double eights = static_cast<double>(b.padded / chunk_size) * (chunk_size / 8);
-  state.counters["ns/8"] = benchmark::Counter(1e-9 * eights * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  state.counters["ns/8"] = benchmark::Counter(1e-9 * eights * static_cast<double>(state.iterations()),
+                                              benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
 void motion(benchmark::State& state, InstructionSet set, const BenchScene& scene, List list, decltype(KernelTable::motion) kernel) {
@@ -187,10 +192,11 @@ void add_all() {
     if (const PhasePasses passes = phase_passes(set); passes.full != nullptr)
       for (const auto& [name, pass] : {std::pair{"full", passes.full}, std::pair{"linear", passes.linear}})
         for (const Phase which : {Phase::geometry, Phase::active, Phase::motion, Phase::springs, Phase::forces, Phase::output})
-          benchmark::RegisterBenchmark(fmt::format("phases/{}/{}/{}", to_string(set), name, phase_names[static_cast<int>(which)]).c_str(), phase, set,
-                                       bench_scene(name), pass, which)
+          benchmark::RegisterBenchmark(
+              fmt::format("phases/{}/{}/{}", to_string(set), name, phase_names[static_cast<int>(which)]).c_str(), phase,
+              set, bench_scene(name), pass, which)
               ->UseManualTime()
-              ->MinTime(0.02);  // of the difference, behind which stands thirty times as much
+              ->MinTime(0.01);  // of what is counted, behind which stands some thirty to a hundred times as much
     if (const UnguardedKernels bare = unguarded_kernels(set); bare.contacts != nullptr) {
       const BenchScene full = bench_scene("full");
       benchmark::RegisterBenchmark(fmt::format("guarded/contacts/{}/L1", to_string(set)).c_str(), contacts, set, full, List::l1, nullptr);

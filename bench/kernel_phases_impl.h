@@ -31,7 +31,7 @@ class PhasesOfChunk {
     const LawConstants c = c_;
     for (int at = 0; at < chunk_size; at += I::width) fetch_geometry<I, scene, false, true>(chunk_, at, b, c, start + at);
   }
-  __attribute__((noinline)) void active() { active_ = active_vectors<Wide, scene>(chunk_, b_, chunk_size); }
+  __attribute__((noinline)) void active() { find_active<Wide, scene>(chunk_, b_, chunk_size, active_); }
   __attribute__((noinline)) void motion(std::int32_t start) {
     const PairBatch b = b_;
     const LawConstants c = c_;
@@ -83,7 +83,9 @@ void phase_pass(const PairBatch& b, const LawConstants& c, Phase which, int time
 
 template <class I>
 PhasePasses passes_of() {
-  constexpr SceneTraits full{Exponent::one, true, true, Rolling::absolute, true, true}, linear{Exponent::one, false, false, Rolling::none, true, true};
+  constexpr SceneTraits full = built_scenes[2].traits, linear = built_scenes[0].traits;
+  static_assert(full.adhesion && full.plasticity && full.equal_spheres && full.rolling == Rolling::absolute && full.energy);
+  static_assert(!linear.plasticity && linear.equal_spheres && linear.rolling == Rolling::none && linear.energy);
   return {&phase_pass<I, full>, &phase_pass<I, linear>};
 }
 

@@ -55,7 +55,7 @@ struct Batch {
   PlateList plates[plate_count];
 
   // Since the last collection.
-  PairTotals pair_totals;             // contacts: of the last pass alone
+  PairTotals pair_totals;             // contacts: of the last pass alone, by which the next one chooses (PairBatch::dense)
   std::int64_t plate_energy[term_count] = {};
   std::int64_t plate_work = 0;
   std::int64_t rolling = 0;

@@ -21,9 +21,9 @@ struct ActiveVectors {
 // then, and its history was cleared in the step in which it parted. A pair whose place is no number counts, and so
 // does padding, which has no distance: law and output mask it.
 template <class I, SceneTraits scene>
-PLATEN_INLINE ActiveVectors active_vectors(const Chunk<scene>& chunk, const PairBatch& b, int count) {
+PLATEN_INLINE void find_active(const Chunk<scene>& chunk, const PairBatch& b, int count, ActiveVectors& active) {
   constexpr unsigned all = I::width < 32 ? (1u << I::width) - 1u : ~0u;
-  ActiveVectors active;
+  active.count = active.pairs = 0;
   for (int at = 0; at < count; at += I::width) {
     unsigned lanes = I::bits(I::negate(I::load(chunk.delta + at) < I::set(-b.leap)));
     if (2 * __builtin_popcount(lanes) > I::width) lanes = all;
@@ -32,16 +32,13 @@ PLATEN_INLINE ActiveVectors active_vectors(const Chunk<scene>& chunk, const Pair
     active.count += lanes != 0;
     active.pairs += __builtin_popcount(lanes);
   }
-  return active;
 }
 
-// All vectors of a chunk of `count` pairs.
+// All vectors of a chunk of `count` pairs; not their `lanes`, which only who draws pairs together reads.
 template <class I>
-PLATEN_INLINE ActiveVectors all_vectors(int count) {
-  ActiveVectors all;
-  for (int at = 0; at < count; at += I::width) all.at[all.count++] = at;
-  all.pairs = count;
-  return all;
+PLATEN_INLINE void take_all(int count, ActiveVectors& active) {
+  active.count = 0, active.pairs = count;
+  for (int at = 0; at < count; at += I::width) active.at[active.count++] = at;
 }
 
 // The active pairs of a chunk drawn together, where they would fill half as many vectors or fewer: columns move to the

@@ -8,7 +8,7 @@
 
 namespace platen {
 
-// Five loops over each chunk, and the choice of pairs after the first, instead of one with everything in it: a processor looks a few hundred instructions ahead,
+// Five loops over each chunk, and after the first, unless the list is dense, the choice of pairs, instead of one with everything in it: a processor looks a few hundred instructions ahead,
 // so only short bodies let the next contacts begin while the last ones wait for their results.
 template <class I, SceneTraits scene, bool exact, bool guarded = true>
 void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairTotals& totals) noexcept {
@@ -29,10 +29,10 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
     else
       for (int at = 0; at < count; at += I::width) fetch_geometry<I, scene, exact, false>(chunk, at, b, c, start + at);
     if (!b.dense)
-      active = active_vectors<Wide, scene>(chunk, b, count);
+      find_active<Wide, scene>(chunk, b, count, active);
     else if (active.pairs != count)
-      active = all_vectors<Wide>(count);
-    const bool few = GatheredPairs<Wide, scene>::worth(active);
+      take_all<Wide>(count, active);
+    const bool few = !b.dense && GatheredPairs<Wide, scene>::worth(active);
     if (few) {
       gathered.take(chunk, b, start, active);
       bring_home<I>(b, next, carried);
@@ -50,7 +50,7 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
     // An overlap above R, the centre of one sphere deep inside the other, is no contact any more: a lever below 1/2.
     // Forces are looked at only where overlaps let them be too large [docs/decisions.md, "Guards where overlaps are deep"].
     if (guarded && I::any(shortest_lever < I::set(c.watched_lever))) {
-      fine = fine && !I::any(shortest_lever < I::set(0.5)) && !too_strong<Wide, scene>(chunk, active, c.force.bound, c.watched_lever);
+      fine = fine && !I::any(shortest_lever < I::set(0.5)) && !too_strong<Wide, scene>(chunk, active, c.force, c.watched_lever);
       shortest_lever = I::set(1.0);
     }
     for (int m = 0; m < active.count; ++m) {

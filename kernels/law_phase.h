@@ -178,20 +178,22 @@ PLATEN_INLINE void for_each_energy(const PairEnergies<I>& energy, const Visit& v
 }
 
 // Whether a contact of the chunk whose lever on either side is below `watched` is out of its bound [N]. Each contact is
-// judged by itself, so that what else its chunk holds does not matter. Written so that a force that is no number counts as too strong.
+// judged by itself, so that what else its chunk holds does not matter, and rounded, so that it does not matter who rounds. Written so
+// that a force that is no number counts as too strong.
 template <class I, SceneTraits scene>
-bool too_strong(const Chunk<scene>& chunk, const ActiveVectors& active, double bound, double watched) {
+bool too_strong(const Chunk<scene>& chunk, const ActiveVectors& active, const Quantum& force, double watched) {
   bool strong = false;
   for (int m = 0; m < active.count; ++m) {
     const int at = active.at[m];
-    const Vec3<I> F = Chunk<scene>::template take<I>(chunk.F, at);
+    const Vec3<I> unrounded = Chunk<scene>::template take<I>(chunk.F, at);
+    const Vec3<I> F = {rounded<I>(unrounded.x, force), rounded<I>(unrounded.y, force), rounded<I>(unrounded.z, force)};
     typename I::Real strength2 = dot(F, F), shortest = I::load(chunk.lever[0] + at);
     if constexpr (scene.rolling == Rolling::absolute) {
       const typename I::Real S = I::load(chunk.S[0] + at);
       strength2 = I::fma(S, S, strength2);
     }
     if constexpr (!scene.equal_spheres) shortest = I::min(I::load(chunk.lever[1] + at), shortest);
-    const auto within = strength2 < I::set(bound * bound);
+    const auto within = strength2 < I::set(force.bound * force.bound);
     strong = strong || I::any(I::both(shortest < I::set(watched), I::negate(within)));
   }
   return strong;

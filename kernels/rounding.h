@@ -13,8 +13,8 @@ PLATEN_INLINE typename I::Real rounded(typename I::Real x, const Quantum& q) {
   return (x + magic) - magic;
 }
 
-// Forces are rounded by the law where that works on two vectors at once: its multiplications leave the units idle that add, which
-// the output phase keeps busy. Elsewhere the law has no register left for it, and the output phase does it.
+// Forces and torques are rounded by the law where that works on two vectors at once: its multiplications leave the units idle that
+// add, which the output phase keeps busy. Elsewhere the output phase does it [docs/decisions.md, "Who rounds"].
 template <class I>
 PLATEN_INLINE Vec3<I> rounded_by_law(const Vec3<I>& a, const Quantum& q) {
   if constexpr (interleaved<I>)

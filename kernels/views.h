@@ -89,7 +89,7 @@ struct PairBatch {
   std::int32_t count;
   std::int32_t end;     // one past the batch's last particle
   std::int32_t spare;   // place of the spare records, in bytes from `sum`
-  bool dense;           // nearly all listed pairs touch: none is looked for that could be left out
+  bool dense;           // most touched in the pass before: none is looked for that could be left out, which changes no bit
   double leap;          // bound of the change of any pair's distance in the last step [m]
   const double *x, *y, *z, *vx, *vy, *vz, *ux, *uy, *uz;  // the state itself, for the owner side
 };

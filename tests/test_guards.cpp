@@ -206,19 +206,20 @@ TEST(Guards, APlateMayPushHarderThanPairs) {
 TEST(Guards, ForcesOfOneChunkAreJudgedOneByOne) {
   constexpr SceneTraits scene = built_scenes[2].traits;
   static_assert(scene.equal_spheres && scene.rolling == Rolling::absolute);
+  constexpr Quantum bound{0.0, 10.0, 0.0};  // nothing is rounded
   Chunk<scene> chunk{};
   ActiveVectors active;
   for (int at = 0; at < 4; ++at) active.at[active.count++] = at, chunk.lever[0][at] = 0.9, chunk.F[0][at] = 1.0;
   chunk.lever[0][1] = 0.6;                      // deep and weak
   chunk.F[1][2] = 12.0;                         // shallow and strong
-  EXPECT_FALSE((too_strong<Scalar, scene>(chunk, active, 10.0, 0.75)));
-  EXPECT_TRUE((too_strong<Scalar, scene>(chunk, active, 10.0, 2.0)));
+  EXPECT_FALSE((too_strong<Scalar, scene>(chunk, active, bound, 0.75)));
+  EXPECT_TRUE((too_strong<Scalar, scene>(chunk, active, bound, 2.0)));
   chunk.F[2][1] = -12.0;                        // deep and strong
-  EXPECT_TRUE((too_strong<Scalar, scene>(chunk, active, 10.0, 0.75)));
+  EXPECT_TRUE((too_strong<Scalar, scene>(chunk, active, bound, 0.75)));
   chunk.F[2][1] = 0.0, chunk.S[0][1] = 12.0;    // by its share in rolling friction
-  EXPECT_TRUE((too_strong<Scalar, scene>(chunk, active, 10.0, 0.75)));
+  EXPECT_TRUE((too_strong<Scalar, scene>(chunk, active, bound, 0.75)));
   chunk.S[0][1] = nan;
-  EXPECT_TRUE((too_strong<Scalar, scene>(chunk, active, 10.0, 0.75)));
+  EXPECT_TRUE((too_strong<Scalar, scene>(chunk, active, bound, 0.75)));
 }
 
 // Between R/2 and R an overlap may be in order, its force not.
