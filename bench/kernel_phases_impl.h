@@ -39,18 +39,22 @@ class PhasesOfChunk {
     for (int at = 0; at < chunk_size; at += I::width) shortest = I::min(fetch_motion<I, scene>(chunk_, at, b, c, start + at), shortest);
     kept_ += I::sum(shortest);
   }
-  __attribute__((noinline)) void springs(std::int32_t start) {
-    const PairBatch b = b_;
-    const LawConstants c = c_;
-    ChunkSums<Wide> sums;
-    for (int at = 0; at < chunk_size; at += Wide::width) springs_of_pairs<Wide, scene, false>(chunk_, at, b, c, start + at, sums);
-    keep(sums);
+  void springs(std::int32_t start) {
+    law(start, [](auto&... of) __attribute__((always_inline)) { springs_of_pairs<Wide, scene, false>(of...); });
   }
-  __attribute__((noinline)) void forces(std::int32_t start) {
+  void forces(std::int32_t start) {
+    law(start, [](auto&... of) __attribute__((always_inline)) { forces_of_pairs<Wide, scene, false>(of...); });
+  }
+  // One half of it.
+  template <class Half>
+  __attribute__((noinline)) void law(std::int32_t start, const Half& half) {
     const PairBatch b = b_;
     const LawConstants c = c_;
     ChunkSums<Wide> sums;
-    for (int at = 0; at < chunk_size; at += Wide::width) forces_of_pairs<Wide, scene, false>(chunk_, at, b, c, start + at, sums);
+    for (int at = 0; at < chunk_size; at += Wide::width) {
+      const std::int32_t k = start + at;
+      half(chunk_, at, b, c, k, sums);
+    }
     keep(sums);
   }
   __attribute__((noinline)) void output(std::int32_t start) {

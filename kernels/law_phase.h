@@ -185,8 +185,7 @@ bool too_strong(const Chunk<scene>& chunk, const ActiveVectors& active, const Qu
   bool strong = false;
   for (int m = 0; m < active.count; ++m) {
     const int at = active.at[m];
-    const Vec3<I> unrounded = Chunk<scene>::template take<I>(chunk.F, at);
-    const Vec3<I> F = {rounded<I>(unrounded.x, force), rounded<I>(unrounded.y, force), rounded<I>(unrounded.z, force)};
+    const Vec3<I> F = rounded<I>(Chunk<scene>::template take<I>(chunk.F, at), force);
     typename I::Real strength2 = dot(F, F), shortest = I::load(chunk.lever[0] + at);
     if constexpr (scene.rolling == Rolling::absolute) {
       const typename I::Real S = I::load(chunk.S[0] + at);
