@@ -62,7 +62,6 @@ class PhasesOfChunk {
     const LawConstants c = c_;
     typename I::Record carried = I::zero_record();
     for (int at = 0; at < chunk_size; at += I::width) output_pairs<I, scene>(chunk_, at, b, c, start + at, carried);
-    bring_home<I>(b, start + chunk_size, carried);
   }
   void keep(const ChunkSums<Wide>& sums) {
     using Sum = typename SingleOf<Wide>::Type;

@@ -66,7 +66,7 @@ PairBatch BatchCopy::pairs(const StateCopy& state) {
   b.k_t_last = k_t_last.empty() ? nullptr : k_t_last.data();
   b.sum = sum.data();
   b.first = first, b.count = padded, b.end = first + count;
-  b.spare = static_cast<std::int32_t>(sum.size() * sizeof(double)) - spare_records * record_bytes;
+  b.nothing = static_cast<std::int32_t>(sum.size() * sizeof(double)) - record_bytes;
   b.dense = true;
   b.leap = std::numeric_limits<double>::infinity();  // every listed pair goes through the law
   b.x = state.x.data(), b.y = state.y.data(), b.z = state.z.data();

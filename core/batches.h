@@ -3,7 +3,7 @@
 //   particles   ... | first ............ first+count | ...      whole vectors
 //   outer list  pairs of own particles within R_i + R_j + margins, by owner; lives from rebuild to rebuild
 //   inner list  those of them within smaller margins, with the history; all that the contact kernel sees
-//   sums        [ own particles | halo slots | spare ]   halo slot: one per foreign partner, written by this batch only,
+//   sums        [ own particles | halo slots | zero ]    halo slot: one per foreign partner, written by this batch only,
 //                                                         read by the partner's batch through `incoming`
 //
 // A pair across two batches belongs to one of them [core/neighbours.h, Ownership].

@@ -82,10 +82,10 @@ void install(Batch& batch, Inner& inner, const Particles& p) {
     batch.from[k] = -1;
   }
   const std::size_t own = static_cast<std::size_t>(batch.count) * record_size;
-  const std::size_t spare = own + batch.halo.size() * record_size;
-  find_owner_runs(batch.i.data(), batch.padded, batch.first, static_cast<std::int32_t>(spare * sizeof(double)), batch.to.data());
+  const std::size_t nothing = own + batch.halo.size() * record_size;
+  find_owner_runs(batch.i.data(), batch.padded, batch.first, static_cast<std::int32_t>(nothing * sizeof(double)), batch.to.data());
   batch.sum.resize(own);
-  batch.sum.resize(spare + spare_records * record_size);
+  batch.sum.resize(nothing + record_size);
 }
 
 void connect_halos(std::vector<Batch>& batches, const ParallelFor& parallel) {

@@ -314,11 +314,11 @@ void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, 
   const std::size_t cleared = found == Sums::cleared ? static_cast<std::size_t>(b.count) * record_size : 0;
   std::memset(b.sum.data() + cleared, 0, (b.sum.size() - cleared) * sizeof(double));
   const double leap = leap_of(b, law.dt);
-  const auto spare = static_cast<std::int32_t>(b.sum.size() * sizeof(double)) - spare_records * record_bytes;
+  const auto nothing = static_cast<std::int32_t>(b.sum.size() * sizeof(double)) - record_bytes;
   // By the last pass, which may have had the list before a prune; none after a rebuild. Whether pairs are passed over changes no bit.
   const bool dense = 4 * b.pair_totals.contacts > 3 * std::int64_t{b.padded};
   const PairBatch pairs{particles_.rows.data(), b.i.data(), b.row_j.data(), b.to.data(), b.sp.data(), b.tx.data(),
-                        b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum.data(), b.first, b.padded, b.first + b.count, spare, dense, leap,
+                        b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum.data(), b.first, b.padded, b.first + b.count, nothing, dense, leap,
                         particles_.x.data(), particles_.y.data(), particles_.z.data(), particles_.vx.data(),
                         particles_.vy.data(), particles_.vz.data(), particles_.ux.data(), particles_.uy.data(),
                         particles_.uz.data()};

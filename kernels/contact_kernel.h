@@ -16,7 +16,7 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
   const PairBatch b = batch;  // copies, which no store through a pointer can change
   const LawConstants c = constants;
   typename I::Record carried = I::zero_record();
-  std::int32_t next = 0;  // contact after the last one whose share is carried
+  std::int32_t next = 0;  // contact after the last one whose owner's sum is carried; -1: none
   bool fine = true;
   Chunk<scene> chunk;
   GatheredPairs<Wide, scene> gathered;
@@ -35,8 +35,6 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
     const bool few = !b.dense && GatheredPairs<Wide, scene>::worth(active);
     if (few) {
       gathered.take(chunk, b, start, active);
-      bring_home<I>(b, next, carried);
-      next = 0;
     }
     const PairBatch seen = few ? gathered.view(b) : b;
     const std::int32_t first = few ? 0 : start;
@@ -54,18 +52,16 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
       shortest_lever = I::set(1.0);
     }
     for (int m = 0; m < active.count; ++m) {
-      if (first + active.at[m] != next) bring_home<I>(seen, next, carried);
+      if (first + active.at[m] != next) carried = taken_up<I>(seen, first + active.at[m]);
       for (int at = active.at[m]; at < active.at[m] + Wide::width; at += I::width)
         output_pairs<I, scene>(chunk, at, seen, c, first + at, carried);
       next = first + active.at[m] + Wide::width;
     }
     if (few) {
-      bring_home<I>(seen, next, carried);
-      next = 0;
+      next = -1;
       gathered.give_back(b);
     }
   }
-  bring_home<I>(b, next, carried);
   totals.out_of_range = totals.out_of_range || !fine;
 }
 

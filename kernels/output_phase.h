@@ -11,9 +11,10 @@ PLATEN_INLINE double* record_at(double* sum, std::int32_t bytes) {
   return reinterpret_cast<double*>(reinterpret_cast<char*>(sum) + bytes);
 }
 
-// Rounds what the law has not rounded, turns contributions into records and adds them up: the owner's by a sum carried from contact to
-// contact (consecutive contacts share owners), the partner's in its place. What is carried goes to the owner's place when the
-// next owner's first contact comes; before, to a spare record, since a branch would be foreseen too rarely.
+// Rounds what the law has not rounded, turns contributions into records and adds them up: the partner's in its place, the owner's by a
+// sum carried from contact to contact, since consecutive contacts share owners. A run of contacts begins with what the owner has
+// got as a partner of others; what is carried is stored with every contact, since a branch would be foreseen too rarely, and read again with none,
+// since what was just stored takes a while to read.
 template <class I, SceneTraits scene>
 PLATEN_INLINE void output_pairs(const Chunk<scene>& chunk, int at, const PairBatch& b, const LawConstants& c,
                                 std::int32_t k, typename I::Record& carried) {
@@ -27,22 +28,17 @@ PLATEN_INLINE void output_pairs(const Chunk<scene>& chunk, int at, const PairBat
   }
   for (int lane = 0; lane < I::width; ++lane) {
     const PairTargets to = b.to[k + lane];
-    double* last = record_at(b.sum, last_of(to));
-    I::store_record(last, I::add(I::load_record(last), carried));
-    carried = I::add_if(again_of(to), carried, records[0][lane]);
+    carried = I::add_if(again_of(to), carried, I::add(I::load_sum(record_at(b.sum, first_of(to))), records[0][lane]));
+    I::store_record(b.sum + record_size * static_cast<std::int64_t>(b.i[k + lane] - b.first), carried);
     double* partner = record_at(b.sum, to.partner);
-    I::store_record(partner, I::add_reaction(I::load_record(partner), records[Chunk<scene>::sides - 1][lane]));
+    I::store_record(partner, I::add_reaction(I::load_sum(partner), records[Chunk<scene>::sides - 1][lane]));
   }
 }
 
-// Adds what is carried to the owner of the contact before `next`; 0: nothing is carried. Contacts that follow each other in
-// the list go on with what is carried; where some are passed over, it is brought home first.
+// What is carried to contact k where it does not follow the one before: all that its owner has got.
 template <class I>
-PLATEN_INLINE void bring_home(const PairBatch& b, std::int32_t next, typename I::Record& carried) {
-  if (next == 0) return;
-  double* place = b.sum + record_size * static_cast<std::int64_t>(b.i[next - 1] - b.first);
-  I::store_record(place, I::add(I::load_record(place), carried));
-  carried = I::zero_record();
+PLATEN_INLINE typename I::Record taken_up(const PairBatch& b, std::int32_t k) {
+  return I::load_sum(b.sum + record_size * static_cast<std::int64_t>(b.i[k] - b.first));
 }
 
 }  // namespace platen

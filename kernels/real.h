@@ -89,6 +89,7 @@ struct Scalar {
     std::memcpy(r.v, p, sizeof r.v);
     return r;
   }
+  static PLATEN_INLINE Record load_sum(const double* p) { return load_record(p); }
   static PLATEN_INLINE void store_record(double* p, const Record& r) { std::memcpy(p, r.v, sizeof r.v); }
   static PLATEN_INLINE Record add(const Record& a, const Record& b) {
     Record r;
@@ -206,6 +207,7 @@ struct Avx2 {
   }
   static PLATEN_INLINE Record zero_record() { return {_mm256_setzero_pd(), _mm256_setzero_pd()}; }
   static PLATEN_INLINE Record load_record(const double* p) { return {_mm256_load_pd(p), _mm256_load_pd(p + 4)}; }
+  static PLATEN_INLINE Record load_sum(const double* p) { return load_record(p); }
   static PLATEN_INLINE void store_record(double* p, const Record& r) {
     _mm256_store_pd(p, r.lo);
     _mm256_store_pd(p + 4, r.hi);
@@ -351,6 +353,11 @@ struct Avx512 {
   }
   static PLATEN_INLINE Record zero_record() { return {_mm512_setzero_pd()}; }
   static PLATEN_INLINE Record load_record(const double* p) { return {_mm512_load_pd(p)}; }
+  static PLATEN_INLINE Record load_sum(const double* p) {
+    __m256d hi = _mm256_load_pd(p + 4);
+    asm("" : "+x"(hi));
+    return {_mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_load_pd(p)), hi, 1)};
+  }
   static PLATEN_INLINE void store_record(double* p, const Record& r) { _mm512_store_pd(p, r.v); }
   static PLATEN_INLINE Record add(const Record& a, const Record& b) { return {_mm512_add_pd(a.v, b.v)}; }
   static PLATEN_INLINE Record add_if(std::uint8_t yes, const Record& a, const Record& b) {

@@ -23,7 +23,6 @@ inline constexpr int record_bytes = 64;
 inline constexpr int chunk_size = 64;  // contacts between two conversions of energies to integers
 inline constexpr int padding = 8;        // particles are padded to a multiple of the widest vector
 inline constexpr int pair_padding = 16;  // contacts to what a kernel takes at once: two such vectors
-inline constexpr int spare_records = 8;  // of a batch's sums, behind the halo slots, for what has no place of its own
 
 // x rounded to a multiple of q: (x + magic) - magic with magic = 1.5 * 2^52 * q. Sums of such numbers are exact as long
 // as they stay below 2^53 q, hence the same in any order.
@@ -68,14 +67,14 @@ struct LawConstants {
 //   i             17     17     17     18    20  ...   owner side: particle of this batch
 //   row_j         216    300    10836  300   252 ...   row of the partner j, any particle: 12 j, in doubles from `rows`
 //   to.partner    64     512    32768  512   256 ...   where j's share goes, in bytes from `sum`: an own particle, or a halo slot
-//   to.last       spare  spare  spare  0     64  ...   where the owner is another one: the record of that of the contact before
+//   to.first      0      zero   zero   64    192 ...   where the owner is another one than before: its record; else the one that stays zero
 //
 // Bytes, because an address that takes a multiplication costs a tenth of the output phase.
 struct PairTargets {
   std::int32_t partner;
-  // Four times the place of `last`, and the lowest eight bits set where the owner is that of the contact before: one array less
+  // Four times the place of `first`, and the lowest eight bits set where the owner is that of the contact before: one array less
   // to follow, of which a processor can only follow so many.
-  std::int32_t last_and_again;
+  std::int32_t first_and_again;
 };
 
 struct PairBatch {
@@ -84,11 +83,11 @@ struct PairBatch {
   const PairTargets* to;
   double *sp, *tx, *ty, *tz;
   double* k_t_last;     // exponent other than 1: k_t of the step before; null otherwise
-  double* sum;          // records: of own particles, halo slots, spare ones
+  double* sum;          // records: of own particles, halo slots, and one that stays zero
   std::int32_t first;   // first particle of the batch
   std::int32_t count;
   std::int32_t end;     // one past the batch's last particle
-  std::int32_t spare;   // place of the spare records, in bytes from `sum`
+  std::int32_t nothing; // place of the record that stays zero, in bytes from `sum`
   bool dense;           // most touched in the pass before: none is looked for that could be left out, which changes no bit
   double leap;          // bound of the change of any pair's distance in the last step [m]
   const double *x, *y, *z, *vx, *vy, *vz, *ux, *uy, *uz;  // the state itself, for the owner side

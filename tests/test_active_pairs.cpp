@@ -39,7 +39,7 @@ struct Sample {
     }
     batch.i = i.data(), batch.row_j = row_j.data(), batch.to = to.data();
     batch.sp = sp.data(), batch.tx = tx.data(), batch.ty = ty.data(), batch.tz = tz.data(), batch.k_t_last = k_t_last.data();
-    batch.first = 100, batch.count = chunk_size, batch.spare = record_bytes * 900, batch.leap = leap;
+    batch.first = 100, batch.count = chunk_size, batch.nothing = record_bytes * 900, batch.leap = leap;
   }
   ActiveVectors active() const {
     ActiveVectors found;
@@ -136,10 +136,10 @@ TEST(ActivePairs, RunsOfOneOwnerAmongThem) {
   gathered.take(s.chunk, s.batch, 0, active);
   const PairBatch view = gathered.view(s.batch);
   const bool again[] = {false, true, false, false, true, false};
-  const int before[] = {-1, -1, 101, 107, -1, 113};  // owner whose sum is complete; none: a spare record
+  const int owner[] = {101, 0, 107, 113, 0, 119};  // whose sum the run begins with
   for (int n = 0; n < 6; ++n) {
     EXPECT_EQ(again_of(view.to[n]), again[n] ? 0xff : 0);
-    EXPECT_EQ(last_of(view.to[n]), record_bytes * (before[n] < 0 ? 900 + n % spare_records : before[n] - 100));
+    EXPECT_EQ(first_of(view.to[n]), record_bytes * (again[n] ? 900 : owner[n] - 100));
   }
 }
 
@@ -165,15 +165,15 @@ Pass pass(const Simulation& sim, const Batch& b, bool dense, double leap_bound) 
   sum.assign(b.sum.size(), 0.0);
   LawConstants law = sim.law();
   law.dt = sim.time_step();
-  const auto spare = static_cast<std::int32_t>(sum.size() * sizeof(double)) - spare_records * record_bytes;
+  const auto nothing = static_cast<std::int32_t>(sum.size() * sizeof(double)) - record_bytes;
   const PairBatch pairs{p.rows.data(), b.i.data(), b.row_j.data(), b.to.data(), sp.data(), tx.data(), ty.data(), tz.data(),
-                        k_t.empty() ? nullptr : k_t.data(), sum.data(), b.first, b.padded, b.first + b.count, spare, dense, leap_bound,
+                        k_t.empty() ? nullptr : k_t.data(), sum.data(), b.first, b.padded, b.first + b.count, nothing, dense, leap_bound,
                         p.x.data(), p.y.data(), p.z.data(), p.vx.data(), p.vy.data(), p.vz.data(), p.ux.data(), p.uy.data(), p.uz.data()};
   Pass found;
   sim.kernels().contacts(pairs, law, found.totals);
   const auto bits = [](const AlignedArray<double>& of, std::size_t count) { return std::string(reinterpret_cast<const char*>(of.data()), count * sizeof(double)); };
   for (const auto* column : {&sp, &tx, &ty, &tz, &k_t}) found.history += bits(*column, column->size());
-  found.sums = bits(sum, sum.size() - spare_records * record_size);  // what is in the spare ones means nothing
+  found.sums = bits(sum, sum.size());
   return found;
 }
 
