@@ -45,6 +45,7 @@ struct Batch {
   AlignedArray<std::int32_t> from;      // place in the outer list
   std::int32_t j(std::size_t k) const { return row_j[k] / row_size; }
   AlignedArray<double> sp, tx, ty, tz, k_t_last;
+  std::int32_t ahead = 0;               // PairBatch::ahead, if it is asked for
 
   AlignedArray<double> sum;           // records
   std::vector<std::int32_t> halo;     // particle of each halo slot

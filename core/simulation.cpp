@@ -321,7 +321,7 @@ void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, 
                         b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum.data(), b.first, b.padded, b.first + b.count, nothing, dense, leap,
                         particles_.x.data(), particles_.y.data(), particles_.z.data(), particles_.vx.data(),
                         particles_.vy.data(), particles_.vz.data(), particles_.ux.data(), particles_.uy.data(),
-                        particles_.uz.data()};
+                        particles_.uz.data(), dense && asks_ahead_ ? b.ahead : 0, particles_.padded, asks_history_};
   b.pair_totals.contacts = 0;
   kernels_.contacts(pairs, law, b.pair_totals);
   b.out_of_range = b.out_of_range || b.pair_totals.out_of_range;

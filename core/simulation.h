@@ -56,7 +56,7 @@ struct EngineOptions {
   InstructionSet instruction_set = InstructionSet::scalar;
   Executor executor = Executor::automatic;
   bool fused = false;       // one task per batch and step instead of two
-  double cache = ordered_cache;  // that the order of tasks counts on in larger beds [bytes]
+  double cache = ordered_cache;  // that the order of tasks counts on in larger beds; of half of it a worker asks ahead [bytes]
   std::function<void(TaskTable&)> tamper;  // for tests: changes every table of tasks before it is used
 };
 
@@ -247,6 +247,7 @@ class Simulation {
   bool lists_stale_ = false;     // prune before the next step
   bool moved_since_prune_ = true;
   int unroll_ = 1;               // steps of the graph
+  bool asks_ahead_ = false, asks_history_ = false;  // kernels/ask_ahead.h
 
   std::unique_ptr<TaskTable> table_;
   std::unique_ptr<FlowGraph> graph_;

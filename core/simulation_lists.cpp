@@ -343,6 +343,9 @@ void Simulation::cut_into_batches(const PairHistories& pairs, int size) {
   const Ownership ownership = engine_.fused ? Ownership::by_colour : Ownership::ahead;
   batches_ = make_batches(particles_, domain_, outer_, size, ownership, kernels_, run);
   fill_inner(batches_, particles_, domain_, inner_, keeps_k_t(), pairs, run);
+  const double bytes = touched_bytes(batches_);
+  asks_ahead_ = bytes > 0.5 * engine_.cache * engine_.threads;
+  asks_history_ = bytes > 2.0 * engine_.cache;
 }
 
 // `sums`: forces by rank; null where there are none yet.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "kernels/active_pairs.h"
+#include "kernels/ask_ahead.h"
 #include "kernels/fetch_phase.h"
 #include "kernels/law_phase.h"
 #include "kernels/output_phase.h"
@@ -24,6 +25,7 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
   ActiveVectors active;
   for (std::int32_t start = 0; start < b.count; start += chunk_size) {
     const int count = start + chunk_size < b.count ? chunk_size : b.count - start;
+    ask_ahead<scene>(b, start);
     if (c.width > 0.0)
       for (int at = 0; at < count; at += I::width) fetch_geometry<I, scene, exact, true>(chunk, at, b, c, start + at);
     else
