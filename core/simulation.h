@@ -56,7 +56,7 @@ struct EngineOptions {
   InstructionSet instruction_set = InstructionSet::scalar;
   Executor executor = Executor::automatic;
   bool fused = false;       // one task per batch and step instead of two
-  double cache = ordered_cache;  // that the order of tasks counts on in larger beds; of half of it a worker asks ahead [bytes]
+  double cache = ordered_cache;  // that the order of tasks counts on in larger beds; a worker whose part is above half of it asks ahead [bytes]
   std::function<void(TaskTable&)> tamper;  // for tests: changes every table of tasks before it is used
 };
 

@@ -11,16 +11,24 @@
 
 namespace platen {
 
-// Rows and records; the first chunk asks for all between. With `asks_history` also for the history of contacts some chunks ahead.
+// Spheres that the chunk from contact `start` on asks for: rows from first to last_row, records from first to last_record.
+struct AskedFor {
+  std::int32_t first, last_row, last_record;
+};
+// The first chunk asks for all between as well. Rows are those of any batch, records of this one alone.
+PLATEN_INLINE AskedFor asked_for(const PairBatch& b, std::int32_t start) {
+  const std::int32_t next = start + chunk_size < b.count ? b.i[start + chunk_size] : b.end, last = next + b.ahead;
+  return {start > 0 ? b.i[start] + b.ahead : b.i[start], last < b.spheres ? last : b.spheres, last < b.end ? last : b.end};
+}
+
+// With `asks_history` also for the history of contacts some chunks ahead; that of the first and the last few comes unasked.
 template <SceneTraits scene>
 PLATEN_INLINE void ask_ahead(const PairBatch& b, std::int32_t start) {
   if (b.ahead == 0) return;
-  const std::int32_t next = start + chunk_size < b.count ? b.i[start + chunk_size] : b.end;
-  const std::int32_t from = start > 0 ? b.i[start] + b.ahead : b.i[start], to = next + b.ahead;
-  const std::int32_t last_row = to < b.spheres ? to : b.spheres, last_record = to < b.end ? to : b.end;
+  const AskedFor spheres = asked_for(b, start);
   constexpr std::int32_t line = 8;
-  for (std::int64_t k = row_size * std::int64_t{from}; k < row_size * std::int64_t{last_row}; k += line) __builtin_prefetch(b.rows + k);
-  for (std::int32_t k = from; k < last_record; ++k) __builtin_prefetch(b.sum + record_size * std::int64_t{k - b.first}, 1);
+  for (std::int64_t k = row_size * std::int64_t{spheres.first}; k < row_size * std::int64_t{spheres.last_row}; k += line) __builtin_prefetch(b.rows + k);
+  for (std::int32_t k = spheres.first; k < spheres.last_record; ++k) __builtin_prefetch(b.sum + record_size * std::int64_t{k - b.first}, 1);
   if (!b.asks_history) return;
   constexpr std::int32_t chunks_ahead = 3;
   const std::int32_t first = start + chunks_ahead * chunk_size;
@@ -28,6 +36,7 @@ PLATEN_INLINE void ask_ahead(const PairBatch& b, std::int32_t start) {
   for (std::int32_t k = first; k < first + chunk_size; k += line) {
     for (const double* column : {b.tx, b.ty, b.tz}) __builtin_prefetch(column + k, 1);
     if constexpr (scene.plasticity) __builtin_prefetch(b.sp + k, 1);
+    if constexpr (scene.exponent != Exponent::one) __builtin_prefetch(b.k_t_last + k, 1);
   }
 }
 

@@ -37,6 +37,7 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
     const bool few = !b.dense && GatheredPairs<Wide, scene>::worth(active);
     if (few) {
       gathered.take(chunk, b, start, active);
+      next = 0;  // its first contact begins a run
     }
     const PairBatch seen = few ? gathered.view(b) : b;
     const std::int32_t first = few ? 0 : start;

@@ -13,8 +13,8 @@ PLATEN_INLINE double* record_at(double* sum, std::int32_t bytes) {
 
 // Rounds what the law has not rounded, turns contributions into records and adds them up: the partner's in its place, the owner's by a
 // sum carried from contact to contact, since consecutive contacts share owners. A run of contacts begins with what the owner has
-// got as a partner of others; what is carried is stored with every contact, since a branch would be foreseen too rarely, and read again with none,
-// since what was just stored takes a while to read.
+// got as a partner of others. What is carried is stored with every contact, since a branch would be foreseen too rarely, and not read back
+// within a run, since what was just stored takes a while to read: the other contacts of a run read the record that stays zero.
 template <class I, SceneTraits scene>
 PLATEN_INLINE void output_pairs(const Chunk<scene>& chunk, int at, const PairBatch& b, const LawConstants& c,
                                 std::int32_t k, typename I::Record& carried) {

@@ -12,11 +12,13 @@
 #include "core/simulation.h"
 #include "kernels/active_pairs.h"
 #include "kernels/twice.h"
+#include "tests/contact_pass.h"
 #include "tests/scenes.h"
 
 namespace platen {
 namespace {
 
+using test::Pass, test::pass;
 using Two = Twice<Scalar>;
 constexpr SceneTraits scene{Exponent::any, true, true, Rolling::absolute, false, true};
 constexpr double leap = 2e-6;  // [m]
@@ -141,40 +143,6 @@ TEST(ActivePairs, RunsOfOneOwnerAmongThem) {
     EXPECT_EQ(again_of(view.to[n]), again[n] ? 0xff : 0);
     EXPECT_EQ(first_of(view.to[n]), record_bytes * (again[n] ? 900 : owner[n] - 100));
   }
-}
-
-// What a pass over a batch leaves behind, as bits.
-struct Pass {
-  std::string history, sums;
-  PairTotals totals;
-  bool operator==(const Pass& o) const {
-    return history == o.history && sums == o.sums && totals.contacts == o.totals.contacts && totals.out_of_range == o.totals.out_of_range &&
-           std::equal(std::begin(totals.energy), std::end(totals.energy), std::begin(o.totals.energy));
-  }
-};
-Pass pass(const Simulation& sim, const Batch& b, bool dense, double leap_bound) {
-  const FloatMode mode;
-  const Particles& p = sim.state();
-  const auto copied = [](const AlignedArray<double>& from) {
-    AlignedArray<double> to;
-    to.resize(from.size());
-    std::copy(from.begin(), from.end(), to.begin());
-    return to;
-  };
-  AlignedArray<double> sp = copied(b.sp), tx = copied(b.tx), ty = copied(b.ty), tz = copied(b.tz), k_t = copied(b.k_t_last), sum;
-  sum.assign(b.sum.size(), 0.0);
-  LawConstants law = sim.law();
-  law.dt = sim.time_step();
-  const auto nothing = static_cast<std::int32_t>(sum.size() * sizeof(double)) - record_bytes;
-  const PairBatch pairs{p.rows.data(), b.i.data(), b.row_j.data(), b.to.data(), sp.data(), tx.data(), ty.data(), tz.data(),
-                        k_t.empty() ? nullptr : k_t.data(), sum.data(), b.first, b.padded, b.first + b.count, nothing, dense, leap_bound,
-                        p.x.data(), p.y.data(), p.z.data(), p.vx.data(), p.vy.data(), p.vz.data(), p.ux.data(), p.uy.data(), p.uz.data()};
-  Pass found;
-  sim.kernels().contacts(pairs, law, found.totals);
-  const auto bits = [](const AlignedArray<double>& of, std::size_t count) { return std::string(reinterpret_cast<const char*>(of.data()), count * sizeof(double)); };
-  for (const auto* column : {&sp, &tx, &ty, &tz, &k_t}) found.history += bits(*column, column->size());
-  found.sums = bits(sum, sum.size());
-  return found;
 }
 
 // With lists so wide that most pairs are apart, and vectors are passed over or drawn together.

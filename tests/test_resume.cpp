@@ -103,6 +103,7 @@ int run_with_interruptions(const fs::path& folder, const std::vector<std::string
       program.send(how == 2 ? SIGTERM : SIGKILL);
     }
     const ProgramResult result = program.wait(120.0);
+    EXPECT_TRUE(attempt > 0 || result.exit_code == 75) << result.report();
     if (result.exit_code == 0) return resumed + going;
     if (result.exit_code == 5) {
       EXPECT_TRUE(has(result.err, "holds no checkpoint")) << result.report();
@@ -156,7 +157,7 @@ TEST_P(Resume, InterruptedAtRandomItLeavesTheSame) {
   EXPECT_FALSE(fs::exists(root / "whole/checkpoint.h5"));
   // Several interruptions on the way, on a fast machine and on a slow one.
   const auto took = std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::steady_clock::now() - begin).count();
-  const auto most = static_cast<unsigned>(std::clamp<std::int64_t>(took / 2, 10, 250));
+  const auto most = static_cast<unsigned>(std::max<std::int64_t>(took / 2, 10));
   int resumed = 0;
   for (int repeat = 0; repeat < 2; ++repeat) {
     const unsigned seed = std::random_device{}();
