@@ -21,7 +21,7 @@ struct Inner {
   std::vector<std::int32_t> from;                          // places in the outer list, ascending
   AlignedArray<double> sp, tx, ty, tz, k_t;                // signed from owner to partner
   std::vector<std::int32_t> slot_of;                       // of foreign particles; -1 where none
-  std::vector<std::int32_t> distances;
+  std::vector<std::int32_t> distances;                     // along the curve, of a sample of contacts
 
   // Starts a list of the outer pairs that `close(i, j)` accepts.
   template <class Close>
@@ -54,9 +54,9 @@ std::int32_t usual_distance(const Batch& batch, std::vector<std::int32_t>& dista
   distances.clear();
   for (std::size_t k = 0; k < static_cast<std::size_t>(batch.used); k += 16) distances.push_back(batch.j(k) - batch.i[k]);
   if (distances.empty()) return 0;
-  const auto quarter = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() * 3 / 4);
-  std::nth_element(distances.begin(), quarter, distances.end());
-  return std::clamp(*quarter, 0, farthest) + in_time;
+  const auto most = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() * 3 / 4);
+  std::nth_element(distances.begin(), most, distances.end());
+  return std::clamp(*most, 0, farthest) + in_time;
 }
 
 // Sums of the batch's own particles stay what they are; halo slots are empty afterwards.
