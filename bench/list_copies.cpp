@@ -42,6 +42,7 @@ BatchCopy::BatchCopy(const Batch& b)
       count(b.count),
       used(b.used),
       padded(b.padded),
+      halo(b.halo),
       incoming(b.incoming) {
   nowhere.resize(record_size);
   for (int plate = 0; plate < plate_count; ++plate) {

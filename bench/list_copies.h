@@ -38,6 +38,7 @@ struct BatchCopy {
   std::vector<double> speed2;
   AlignedArray<double> nowhere;
   std::int32_t first = 0, count = 0, used = 0, padded = 0;
+  std::vector<std::int32_t> halo;
   std::vector<Incoming> incoming;
   std::vector<PlateCopy> plates;  // those with spheres near them
   PairBatch pairs(const StateCopy& state);

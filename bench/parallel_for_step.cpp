@@ -26,10 +26,9 @@ ParallelForStep::ParallelForStep(const Simulation& sim, const PairLaw& law, doub
 // As Simulation::merge.
 void ParallelForStep::merge(BatchCopy& b) {
   for (const Incoming& in : b.incoming) {
-    const double* from =
-        batches_[static_cast<std::size_t>(in.batch)].sum.data() + record_size * static_cast<std::size_t>(in.slot);
-    double* to = b.sum.data() + record_size * static_cast<std::size_t>(in.local);
-    for (int k = 0; k < record_size; ++k) to[k] += from[k];
+    const BatchCopy& from = batches_[static_cast<std::size_t>(in.batch)];
+    const auto slot = static_cast<std::size_t>(in.slot);
+    kernels_.merge({b.sum.data(), from.sum.data() + record_size * (static_cast<std::size_t>(from.count) + slot), from.halo.data() + slot, b.first, in.count});
   }
   for (const PlateCopy& list : b.plates)
     for (std::size_t m = 0; m < static_cast<std::size_t>(list.used); ++m) {

@@ -25,11 +25,11 @@ struct PlateList {
   std::int32_t used = 0, padded = 0;
 };
 
-// A record of another batch that belongs to one of our particles.
+// Records of another batch that belong to particles of ours: a stretch of its halo slots.
 struct Incoming {
   std::int32_t batch;
-  std::int32_t slot;   // record in that batch's sum
-  std::int32_t local;  // our particle, from `first`
+  std::int32_t slot;   // first of them, in that batch's halo
+  std::int32_t count;
 };
 
 struct Batch {
@@ -48,7 +48,7 @@ struct Batch {
   std::int32_t ahead = 0;               // PairBatch::ahead, if it is asked for
 
   AlignedArray<double> sum;           // records
-  std::vector<std::int32_t> halo;     // particle of each halo slot
+  std::vector<std::int32_t> halo;     // particle of each halo slot, ascending
   std::vector<Incoming> incoming;
   std::vector<int> partners;          // batches whose particles our outer pairs touch
   std::vector<int> owners;            // batches whose outer pairs touch our particles

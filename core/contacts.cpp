@@ -110,11 +110,9 @@ void connect_halos(std::vector<Batch>& batches, const ParallelFor& parallel) {
       const Batch& other = batches[static_cast<std::size_t>(owner)];
       const auto begin = std::lower_bound(other.halo.begin(), other.halo.end(), batch.first);
       const auto end = std::lower_bound(begin, other.halo.end(), batch.first + batch.count);
-      for (auto it = begin; it != end; ++it)
-        batch.incoming.push_back({owner, other.count + static_cast<std::int32_t>(it - other.halo.begin()), *it - batch.first});
+      if (begin != end)
+        batch.incoming.push_back({owner, static_cast<std::int32_t>(begin - other.halo.begin()), static_cast<std::int32_t>(end - begin)});
     }
-    std::stable_sort(batch.incoming.begin(), batch.incoming.end(),
-                     [](const Incoming& a, const Incoming& b) { return a.local < b.local; });
   });
 }
 

@@ -6,6 +6,7 @@
 #include "kernels/contact_kernel.h"
 #include "kernels/kernel_table.h"
 #include "kernels/look_kernel.h"
+#include "kernels/merge_kernel.h"
 #include "kernels/motion_kernel.h"
 #include "kernels/plate_kernel.h"
 #include "kernels/search_kernel.h"
@@ -64,6 +65,7 @@ KernelTable kernels_of(InstructionSet set, const KernelRequest& request) {
   }
   table.motion = table.energy ? motion_of<I, true>(equal_spheres, request.rolling)
                               : motion_of<I, false>(equal_spheres, request.rolling);
+  table.merge = &merge_kernel<I>;
   table.search = &search_kernel<I>;
   table.look = &look_kernel<I>;
   return table;

@@ -15,6 +15,7 @@ struct KernelTable {
   void (*contacts)(const PairBatch&, const LawConstants&, PairTotals&) noexcept = nullptr;
   void (*plates)(const PlateBatch&, const Plane&, const PlateConstants&, PlateTotals&) noexcept = nullptr;
   void (*motion)(const MotionBatch&, const MotionConstants&, MotionTotals&) noexcept = nullptr;
+  void (*merge)(const SharesBatch&) noexcept = nullptr;
   int (*search)(const SearchMembers&, const SearchRange*, int count, const SearchedSphere&, std::int32_t* found) noexcept = nullptr;
   void (*look)(const LookBatch&, const LookConstants&, LookTotals&) noexcept = nullptr;
   InstructionSet instruction_set = InstructionSet::scalar;

@@ -96,6 +96,15 @@ struct PairBatch {
   bool asks_history;     // of contacts as well, where no cache holds the bed
 };
 
+// Shares that another batch holds of spheres of this one: records in a row.
+struct SharesBatch {
+  double* sum;                   // records of this batch's spheres
+  const double* shares;
+  const std::int32_t* particle;  // whose each of them is
+  std::int32_t first;            // first particle of this batch
+  std::int32_t count;
+};
+
 struct PairTotals {
   std::int64_t contacts = 0;               // touching
   std::int64_t energy[term_count] = {};    // quanta
