@@ -307,7 +307,8 @@ double Simulation::leap_of(const Batch& b, double dt) const {
   return (1.0 + 1e-9) * (b.fastest + fastest) * dt + 1e-9 * largest_radius_;
 }
 
-void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law, Sums found) {
+void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law, Sums found,
+                          const StretchesOfLines* asked) {
   const auto index = static_cast<std::size_t>(&b - batches_.data());
   merged_[index] = 0;
   if (found == Sums::put_aside) saved_->batches[index].sums.swap(b.sum);
@@ -317,11 +318,12 @@ void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, 
   const auto nothing = static_cast<std::int32_t>(b.sum.size() * sizeof(double)) - record_bytes;
   // By the last pass, which may have had the list before a prune; none after a rebuild. Whether pairs are passed over changes no bit.
   const bool dense = 4 * b.pair_totals.contacts > 3 * std::int64_t{b.padded};
-  const PairBatch pairs{particles_.rows.data(), b.i.data(), b.row_j.data(), b.to.data(), b.sp.data(), b.tx.data(),
+  PairBatch pairs{particles_.rows.data(), b.i.data(), b.row_j.data(), b.to.data(), b.sp.data(), b.tx.data(),
                         b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum.data(), b.first, b.padded, b.first + b.count, nothing, dense, leap,
                         particles_.x.data(), particles_.y.data(), particles_.z.data(), particles_.vx.data(),
                         particles_.vy.data(), particles_.vz.data(), particles_.ux.data(), particles_.uy.data(),
-                        particles_.uz.data(), dense && asks_ahead_ ? b.ahead : 0, particles_.padded, asks_history_};
+                        particles_.uz.data(), dense && asks_ahead_ ? b.ahead : 0, particles_.padded, asks_history_, nullptr, 0, 0};
+  if (asked != nullptr) asked->put_into(pairs);
   b.pair_totals.contacts = 0;
   kernels_.contacts(pairs, law, b.pair_totals);
   b.out_of_range = b.out_of_range || b.pair_totals.out_of_range;
@@ -347,7 +349,40 @@ void Simulation::run_task(const Task& task) {
   Batch& b = batches_[static_cast<std::size_t>(task.batch)];
   const bool first = task.offset == 0;
   if (task.kind != TaskKind::contacts) integrate(b, first ? first_motion_ : motion_, first);
-  if (task.kind != TaskKind::integrate) contacts(b, step_ + task.offset + 1, law_, plate_law_, first ? Sums::put_aside : Sums::cleared);
+  if (task.kind == TaskKind::integrate) return;
+  const auto pass = [&](const StretchesOfLines* asked) {
+    contacts(b, step_ + task.offset + 1, law_, plate_law_, first ? Sums::put_aside : Sums::cleared, asked);
+  };
+  if (asks_.empty() || asks_[static_cast<std::size_t>(task.number)].empty()) return pass(nullptr);
+  const StretchesOfLines asked = lines_of(asks_[static_cast<std::size_t>(task.number)]);
+  pass(&asked);
+}
+
+StretchesOfLines Simulation::lines_of(const std::vector<Asked>& asks) const {
+  StretchesOfLines lines;
+  const Particles& p = particles_;
+  for (const Asked& a : asks) {
+    const Batch& b = batches_[static_cast<std::size_t>(a.batch)];
+    const auto first = static_cast<std::size_t>(b.first), count = static_cast<std::size_t>(b.count), listed = static_cast<std::size_t>(b.padded);
+    const auto add = [&](const auto* array, std::size_t size) { lines.add(array, size, a.from, a.to); };
+    if (a.contacts) {
+      for (const auto* column : {&b.sp, &b.tx, &b.ty, &b.tz, &b.k_t_last})
+        if (!column->empty()) add(column->data(), listed);
+      add(b.i.data(), listed), add(b.row_j.data(), listed), add(b.to.data(), listed);
+      continue;
+    }
+    for (const auto* column : {&p.x, &p.y, &p.z, &p.vx, &p.vy, &p.vz, &p.ux, &p.uy, &p.uz, &p.radius, &p.inverse_radius, &p.mass, &p.inverse_mass, &speed2_})
+      if (!column->empty()) add(column->data() + first, count);
+    add(p.rows.data() + row_size * first, row_size * count);
+    // Those of the contacts of a run's first step on; before, its first integration meets others.
+    const auto sums = [this](std::size_t batch) { return saved_->batches[batch].sums_of_run; };
+    add(sums(static_cast<std::size_t>(a.batch)), record_size * count);
+    for (const Incoming& in : b.incoming) {
+      const auto owner = static_cast<std::size_t>(in.batch);
+      add(sums(owner) + record_size * static_cast<std::size_t>(batches_[owner].count + in.slot), record_size * static_cast<std::size_t>(in.count));
+    }
+  }
+  return lines;
 }
 
 // Forces at the present step without advancing springs: after something other than motion changed.
@@ -395,8 +430,12 @@ void Simulation::run_chunk(int steps) {
 void Simulation::prepare_graph() {
   if (table_) return;
   graph_.reset();
+  asks_.clear();
   table_ = std::make_unique<TaskTable>(batches_, unroll_, engine_.fused);
-  order_if_large(*table_, batches_, engine_.cache, engine_.executor == Executor::flow_graph ? engine_.threads : 1, on_workers());
+  const bool alone = engine_.threads == 1 || engine_.executor == Executor::serial;
+  const double cache = order_if_large(*table_, batches_, engine_.cache, engine_.executor == Executor::flow_graph ? engine_.threads : 1, on_workers());
+  // A worker asks for what it will itself take next; where anybody may take a task nobody knows who that is.
+  if (cache > 0.0 && (alone || !table_->worker().empty())) asks_ = asks_of_tasks(*table_, batches_, asked_beyond * cache);
   if (engine_.tamper) engine_.tamper(*table_);
   if (engine_.executor == Executor::flow_graph)
     workers_->arena.execute([&] { graph_ = std::make_unique<FlowGraph>(*table_, [this](const Task& task) { run_task(task); }); });

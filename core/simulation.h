@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "core/asked_lines.h"
 #include "core/batches.h"
 #include "core/contacts.h"
 #include "core/fixed_sum.h"
@@ -21,6 +22,7 @@
 #include "core/plates.h"
 #include "core/stability.h"
 #include "core/step_graph.h"
+#include "core/task_asks.h"
 #include "core/task_order.h"
 #include "kernels/kernel_table.h"
 #include "kernels/law_parameters.h"
@@ -143,6 +145,7 @@ class Simulation {
   // For tests and benches: the lists and tasks as they are.
   const std::vector<Batch>& batches() const { return batches_; }
   const Particles& state() const { return particles_; }
+  const TaskAsks& asks() const { return asks_; }
   const LawConstants& law() const { return law_; }
   const PlateConstants& plate_law() const { return plate_law_; }
   void rebuild_now();
@@ -158,7 +161,9 @@ class Simulation {
   void integrate(Batch& batch, const MotionConstants& c, bool keeps_sums);
   bool pairs_within(const Batch& batch, double most) const;
   enum class Sums { old, put_aside, cleared };  // what a pass over the contacts finds
-  void contacts(Batch& batch, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law, Sums found);
+  void contacts(Batch& batch, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law, Sums found,
+                const StretchesOfLines* asked = nullptr);
+  StretchesOfLines lines_of(const std::vector<Asked>& asks) const;
   void run_task(const Task& task);
   void collect();
   void rebuild();
@@ -249,6 +254,7 @@ class Simulation {
   int unroll_ = 1;               // steps of the graph
   bool asks_ahead_ = false, asks_history_ = false;  // kernels/ask_ahead.h
 
+  TaskAsks asks_;  // of the table's tasks; empty where none asks
   std::unique_ptr<TaskTable> table_;
   std::unique_ptr<FlowGraph> graph_;
   struct Workers;

@@ -22,6 +22,7 @@ struct Simulation::Saved {
   struct OfBatch {
     AlignedArray<double> history;    // copies: contacts read and write them in place
     AlignedArray<double> sums;       // put aside by the first pass over the contacts
+    const double* sums_of_run = nullptr;  // where the run will have its own: tasks of other batches may not look into arrays that are swapped
     std::int64_t contacts = 0;
   };
   std::vector<OfBatch> batches;

@@ -428,6 +428,7 @@ void Simulation::save() {
     for_each_history(b, [&](std::size_t size) { to.history.resize(size); },
                      [&](double* data, std::size_t size, std::size_t at) { std::copy_n(data, size, to.history.data() + at); });
     to.sums.resize(b.sum.size());
+    to.sums_of_run = to.sums.data();
     to.contacts = b.pair_totals.contacts;
   });
   s.rows.swap(particles_.rows);  // last, so that nothing is lost where memory runs out

@@ -60,6 +60,8 @@ TaskTable::TaskTable(const std::vector<Batch>& batches, int steps, bool fused) :
     }
   }
 
+  for (std::size_t t = 0; t < tasks_.size(); ++t) tasks_[t].number = static_cast<std::int32_t>(t);
+
   const auto resources = static_cast<std::size_t>(count) * resource_count;
   std::vector<std::int32_t> writer(resources, -1);
   std::vector<std::vector<std::int32_t>> readers(resources);
@@ -105,6 +107,7 @@ void TaskTable::reorder(const TaskOrder& order) {
   for (const std::int32_t t : order.tasks) {
     const auto k = static_cast<std::size_t>(t);
     tasks.push_back(tasks_[k]), predecessors.push_back(predecessors_[k]);
+    tasks.back().number = place[k];
     successors.push_back(std::move(successors_[k]));
     for (std::int32_t& next : successors.back()) next = place[static_cast<std::size_t>(next)];
   }
@@ -118,6 +121,12 @@ void TaskTable::reorder(const TaskOrder& order) {
     next_of_worker_[k] = next[worker];
     next[worker] = static_cast<std::int32_t>(k);
   }
+}
+
+std::vector<int> worker_of_batches(const TaskTable& table, std::size_t batches) {
+  std::vector<int> worker(batches, 0);
+  for (std::size_t k = 0; k < table.worker().size(); ++k) worker[static_cast<std::size_t>(table.tasks()[k].batch)] = table.worker()[k];
+  return worker;
 }
 
 void TaskTable::remove_edge(std::int32_t from, std::int32_t to) {

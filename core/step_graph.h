@@ -30,6 +30,7 @@ struct Task {
   TaskKind kind;
   int batch;
   int offset;  // step within the graph
+  std::int32_t number = 0;  // in its table
 };
 
 struct Access {
@@ -72,6 +73,9 @@ class TaskTable {
   std::vector<std::vector<std::int32_t>> successors_;
   std::vector<std::int32_t> predecessors_, worker_, next_of_worker_;
 };
+
+// Who has each of so many batches; all are of worker 0 where any worker may take any task.
+std::vector<int> worker_of_batches(const TaskTable& table, std::size_t batches);
 
 using TaskBody = std::function<void(const Task&)>;
 

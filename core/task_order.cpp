@@ -11,40 +11,6 @@ namespace platen {
 
 namespace {
 
-// Of each sphere: the state (nine columns and the row), its sums, its image and speed; of each contact: its history and lists.
-double state_bytes(const Batch& b) {
-  const double sphere = sizeof(double) * (9 + row_size + record_size + 1) + 2 * sizeof(std::int32_t);
-  return sphere * b.count + record_bytes * static_cast<double>(b.halo.size());
-}
-double contact_bytes(const Batch& b) {
-  const double history = sizeof(double) * (b.k_t_last.empty() ? 4 : 5);
-  return (history + 2 * sizeof(std::int32_t) + sizeof(PairTargets)) * static_cast<double>(b.padded);
-}
-
-// Batches with numbers 0, 1, ..., some of which belong to it; adding, removing and looking at all take little.
-class Subset {
- public:
-  explicit Subset(std::size_t of) : place_(of, -1) {}
-  const std::vector<int>& members() const { return members_; }
-  void add(int b) {
-    if (place_[static_cast<std::size_t>(b)] >= 0) return;
-    place_[static_cast<std::size_t>(b)] = static_cast<int>(members_.size());
-    members_.push_back(b);
-  }
-  void remove(int b) {
-    const int place = place_[static_cast<std::size_t>(b)];
-    if (place < 0) return;
-    members_[static_cast<std::size_t>(place)] = members_.back();
-    place_[static_cast<std::size_t>(members_.back())] = place;
-    members_.pop_back();
-    place_[static_cast<std::size_t>(b)] = -1;
-  }
-
- private:
-  std::vector<int> members_;
-  std::vector<int> place_;
-};
-
 // Who has which batch: the workers' parts of the bed are equally large, slabs across an axis, or stretches of the curve.
 enum class Cut { across_x, across_y, across_z, of_curve };
 std::vector<int> parts_of(const std::vector<Batch>& batches, int workers, Cut cut) {
@@ -64,93 +30,6 @@ std::vector<int> parts_of(const std::vector<Batch>& batches, int workers, Cut cu
   }
   return worker;
 }
-
-// What the workers' caches hold of their batches: states (2b) and contacts (2b + 1).
-class Caches {
- public:
-  Caches(const std::vector<Batch>& batches, const std::vector<int>& worker, double bytes)
-      : capacity_(bytes), worker_(worker), near_(batches.size(), 0) {
-    for (const Batch& b : batches) {
-      size_.push_back(state_bytes(b)), size_.push_back(contact_bytes(b));
-      std::vector<int> all = b.partners;
-      all.insert(all.end(), b.owners.begin(), b.owners.end());
-      std::sort(all.begin(), all.end());
-      all.erase(std::unique(all.begin(), all.end()), all.end());
-      neighbours_.push_back(std::move(all));
-    }
-    last_use_.assign(size_.size(), -1);
-    const int workers = worker.empty() ? 1 : *std::max_element(worker.begin(), worker.end()) + 1;
-    one_.resize(static_cast<std::size_t>(workers));
-    around_.assign(static_cast<std::size_t>(workers), Subset(batches.size()));
-  }
-
-  // Batches of a worker that are in its cache or have a neighbour in any.
-  const std::vector<int>& around(std::size_t worker) const { return around_[worker].members(); }
-  double missing(const Task& task) const {
-    const auto state = 2 * static_cast<std::size_t>(task.batch);
-    return (holds(state) ? 0.0 : size_[state]) + (task.kind == TaskKind::integrate || holds(state + 1) ? 0.0 : size_[state + 1]);
-  }
-  // Of whichever cache: those let each other go on.
-  double share_of_neighbours(int batch) const {
-    const auto b = static_cast<std::size_t>(batch);
-    return neighbours_[b].empty() ? 0.0 : near_[b] / static_cast<double>(neighbours_[b].size());
-  }
-  double taken_in() const { return taken_in_; }
-  void use(const Task& task) {
-    const auto state = 2 * static_cast<std::size_t>(task.batch);
-    touch(state);
-    if (task.kind != TaskKind::integrate) touch(state + 1);
-  }
-
- private:
-  struct Cache {
-    double held = 0.0;
-    std::vector<std::size_t> uses;
-    std::size_t oldest = 0;
-  };
-  bool holds(std::size_t what) const { return last_use_[what] >= 0; }
-  void touch(std::size_t what) {
-    Cache& c = one_[static_cast<std::size_t>(worker_[what / 2])];
-    const bool is_new = !holds(what);
-    last_use_[what] = static_cast<std::int64_t>(c.uses.size());
-    c.uses.push_back(what);
-    if (is_new) {
-      c.held += size_[what];
-      taken_in_ += size_[what];
-      if (what % 2 == 0) tell_neighbours(static_cast<int>(what / 2), 1);
-    }
-    for (; c.held > capacity_ && c.oldest + 1 < c.uses.size(); ++c.oldest) {
-      const std::size_t old = c.uses[c.oldest];
-      if (last_use_[old] != static_cast<std::int64_t>(c.oldest)) continue;  // used again since
-      last_use_[old] = -1;
-      c.held -= size_[old];
-      if (old % 2 == 0) tell_neighbours(static_cast<int>(old / 2), -1);
-    }
-  }
-  void tell_neighbours(int batch, int change) {
-    for (const int b : neighbours_[static_cast<std::size_t>(batch)]) {
-      near_[static_cast<std::size_t>(b)] += change;
-      update_around(b);
-    }
-    update_around(batch);
-  }
-  void update_around(int b) {
-    Subset& around = around_[static_cast<std::size_t>(worker_[static_cast<std::size_t>(b)])];
-    if (near_[static_cast<std::size_t>(b)] > 0 || holds(2 * static_cast<std::size_t>(b)))
-      around.add(b);
-    else
-      around.remove(b);
-  }
-
-  double capacity_, taken_in_ = 0.0;
-  std::vector<int> worker_;  // of each batch
-  std::vector<double> size_;
-  std::vector<std::int64_t> last_use_;  // place in its cache's uses; -1: not held
-  std::vector<Cache> one_;              // of each worker
-  std::vector<std::vector<int>> neighbours_;
-  std::vector<int> near_;  // neighbours whose states are held
-  std::vector<Subset> around_;  // of each worker
-};
 
 double mean_pairs(const std::vector<Batch>& batches) {
   double sum = 0.0;
@@ -212,7 +91,7 @@ class Planner {
     order_.tasks.push_back(t), order_.worker.push_back(static_cast<std::int32_t>(w));
     ready_[static_cast<std::size_t>(task(t).batch)] = -1;
     --ready_tasks_[w];
-    const double missing = caches_.missing(task(t));
+    const double missing = caches_.missing(task(t)).all();
     caches_.use(task(t));
     return missing;
   }
@@ -231,7 +110,7 @@ class Planner {
       const std::int32_t t = ready_[static_cast<std::size_t>(b)];
       if (t < 0) continue;
       const int phase = 2 * task(t).offset + (task(t).kind == TaskKind::contacts ? 1 : 0);
-      const double price = caches_.missing(task(t)) / mean_ + phase_weighs_ * phase - neighbours_weigh * caches_.share_of_neighbours(b);
+      const double price = caches_.missing(task(t)).all() / mean_ + phase_weighs_ * phase - neighbours_weigh * caches_.share_of_neighbours(b);
       if (best < 0 || price < best_price || (price == best_price && t < best)) best = t, best_price = price;
     }
     if (best >= 0) return best;
@@ -247,7 +126,7 @@ class Planner {
   std::vector<std::int32_t> waits_;   // for how many each task still waits
   std::vector<std::int32_t> ready_;   // task of each batch that may begin, or -1
   std::vector<int> worker_;           // of each batch
-  Caches caches_;
+  CacheModel caches_;
   std::vector<int> ready_tasks_;      // of each worker
   // Other workers count on a task this much later, about the time of one: what takes longer than foreseen then keeps nobody waiting.
   double late_;
@@ -261,16 +140,8 @@ constexpr std::size_t least_batches_of_worker = 16;
 
 }  // namespace
 
-double touched_bytes(const std::vector<Batch>& batches) {
-  double bytes = 0.0;
-  for (const Batch& b : batches) bytes += state_bytes(b) + contact_bytes(b);
-  return bytes;
-}
-
 double bytes_from_memory(const TaskTable& table, const std::vector<Batch>& batches, double bytes) {
-  std::vector<int> worker(batches.size(), 0);
-  for (std::size_t k = 0; k < table.worker().size(); ++k) worker[static_cast<std::size_t>(table.tasks()[k].batch)] = table.worker()[k];
-  Caches caches(batches, worker, bytes);
+  CacheModel caches(batches, worker_of_batches(table, batches.size()), bytes);
   for (const Task& task : table.tasks()) caches.use(task);
   return caches.taken_in();
 }
@@ -295,13 +166,14 @@ TaskOrder order_for_cache(const TaskTable& table, const std::vector<Batch>& batc
   return std::move(best->order);
 }
 
-void order_if_large(TaskTable& table, const std::vector<Batch>& batches, double bytes, int workers, const ParallelFor& parallel) {
+double order_if_large(TaskTable& table, const std::vector<Batch>& batches, double bytes, int workers, const ParallelFor& parallel) {
   const double touched = touched_bytes(batches), of_batch = touched / static_cast<double>(std::max<std::size_t>(batches.size(), 1));
-  if (touched <= 2.0 * bytes || 256.0 * of_batch <= bytes) return;
+  if (touched <= 2.0 * bytes || 256.0 * of_batch <= bytes) return 0.0;
   const bool parts = workers > 1 && batches.size() >= least_batches_of_worker * static_cast<std::size_t>(workers);
   // Up to eight cores share a third cache, of some three times what one may count on.
   const double own = parts ? std::min(bytes, bytes * 8.0 / (3.0 * std::min(workers, 8))) : bytes;
   table.reorder(order_for_cache(table, batches, own, parts ? workers : 1, parallel));
+  return own;
 }
 
 }  // namespace platen

@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/cache_model.h"
 #include "core/neighbours.h"
 #include "core/step_graph.h"
 
@@ -22,9 +23,6 @@ namespace platen {
 // Bytes of a cache that the order counts on: part of the third cache of common processors, since threads, other programs and what
 // the count leaves out want some too. More brings little.
 inline constexpr double ordered_cache = 12 << 20;
-
-// What a step touches of these batches [bytes].
-double touched_bytes(const std::vector<Batch>& batches);
 
 // What a cache that forgets what was not touched for longest takes in from memory, if the tasks run as the table has them [bytes];
 // of such caches, one for each worker, where the tasks have workers.
@@ -44,7 +42,7 @@ TaskOrder order_for_cache(const TaskTable& table, const std::vector<Batch>& batc
 
 // Puts the tasks into such an order where the batches have more than twice the bytes; not where they are so small that hundreds
 // fit in, for which nobody asks but a case file's `batch`: the search would take longer than it saves. Workers with too few batches to have
-// a part of their own take what comes next; of more than two each counts on less than `bytes`.
-void order_if_large(TaskTable& table, const std::vector<Batch>& batches, double bytes, int workers, const ParallelFor& parallel = in_turn);
+// a part of their own take what comes next; of more than two each counts on less than `bytes`. What each counts on; 0 where the table is left as it is.
+double order_if_large(TaskTable& table, const std::vector<Batch>& batches, double bytes, int workers, const ParallelFor& parallel = in_turn);
 
 }  // namespace platen

@@ -40,4 +40,22 @@ PLATEN_INLINE void ask_ahead(const PairBatch& b, std::int32_t start) {
   }
 }
 
+// Asks, chunk by chunk, for what tasks to come will find in no cache.
+class AskForOthers {
+ public:
+  PLATEN_INLINE void chunk(const PairBatch& b) {
+    for (std::int64_t left = b.lines_of_chunk; left > 0 && stretch_ < b.stretches;) {
+      const AskedLines& lines = b.lines[stretch_];
+      const std::int64_t end = line_ + left < lines.count ? line_ + left : lines.count;
+      left -= end - line_;
+      for (; line_ < end; ++line_) __builtin_prefetch(lines.first + 64 * line_, 0, 2);  // into the second cache
+      if (line_ == lines.count) ++stretch_, line_ = 0;
+    }
+  }
+
+ private:
+  std::int32_t stretch_ = 0;
+  std::int64_t line_ = 0;
+};
+
 }  // namespace platen

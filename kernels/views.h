@@ -77,6 +77,12 @@ struct PairTargets {
   std::int32_t first_and_again;
 };
 
+// Lines of memory that a task to come will need.
+struct AskedLines {
+  const char* first;
+  std::int64_t count;
+};
+
 struct PairBatch {
   const double* rows;
   const std::int32_t *i, *row_j;
@@ -94,6 +100,8 @@ struct PairBatch {
   std::int32_t ahead;    // partners are asked for so many places ahead of their owners; 0 where a near cache holds the bed, or few touch
   std::int32_t spheres;  // that have rows
   bool asks_history;     // of contacts as well, where no cache holds the bed
+  const AskedLines* lines;  // for others [core/task_asks.h], so many of them with each chunk
+  std::int32_t stretches, lines_of_chunk;
 };
 
 // Shares that another batch holds of spheres of this one: records in a row.

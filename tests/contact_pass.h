@@ -20,8 +20,8 @@ struct Pass {
            std::equal(std::begin(totals.energy), std::end(totals.energy), std::begin(o.totals.energy));
   }
 };
-// `ahead`: partners are asked for so far ahead, and history with them; 0: nobody asks.
-inline Pass pass(const Simulation& sim, const Batch& b, bool dense, double leap_bound, std::int32_t ahead = 0) {
+// `ahead`: partners are asked for so far ahead, and history with them; 0: nobody asks. `others`: what tasks to come need.
+inline Pass pass(const Simulation& sim, const Batch& b, bool dense, double leap_bound, std::int32_t ahead = 0, const StretchesOfLines& others = {}) {
   const FloatMode mode;
   const Particles& p = sim.state();
   const auto copied = [](const AlignedArray<double>& from) {
@@ -35,9 +35,10 @@ inline Pass pass(const Simulation& sim, const Batch& b, bool dense, double leap_
   LawConstants law = sim.law();
   law.dt = sim.time_step();
   const auto nothing = static_cast<std::int32_t>(sum.size() * sizeof(double)) - record_bytes;
-  const PairBatch pairs{p.rows.data(), b.i.data(), b.row_j.data(), b.to.data(), sp.data(), tx.data(), ty.data(), tz.data(),
+  PairBatch pairs{p.rows.data(), b.i.data(), b.row_j.data(), b.to.data(), sp.data(), tx.data(), ty.data(), tz.data(),
                         k_t.empty() ? nullptr : k_t.data(), sum.data(), b.first, b.padded, b.first + b.count, nothing, dense, leap_bound,
-                        p.x.data(), p.y.data(), p.z.data(), p.vx.data(), p.vy.data(), p.vz.data(), p.ux.data(), p.uy.data(), p.uz.data(), ahead, p.padded, ahead != 0};
+                        p.x.data(), p.y.data(), p.z.data(), p.vx.data(), p.vy.data(), p.vz.data(), p.ux.data(), p.uy.data(), p.uz.data(), ahead, p.padded, ahead != 0, nullptr, 0, 0};
+  others.put_into(pairs);
   Pass found;
   sim.kernels().contacts(pairs, law, found.totals);
   const auto bits = [](const AlignedArray<double>& of, std::size_t count) { return std::string(reinterpret_cast<const char*>(of.data()), count * sizeof(double)); };
