@@ -136,25 +136,32 @@ struct Closer {
 
 }  // namespace
 
-PairHistories pair_history(const std::vector<Batch>& batches, const Particles& p) {
+PairHistories pair_history(const std::vector<Batch>& batches, const Particles& p, const ParallelFor& parallel) {
   PairHistories all;
+  all.by_place = true;
   all.start.assign(static_cast<std::size_t>(p.count) + 1, 0);
-  const auto for_each = [&](const auto& visit) {
-    for (const Batch& b : batches)
-      for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k)
-        if (has_history(b, k)) visit(b, k, p.rank[static_cast<std::size_t>(b.i[k])], p.rank[static_cast<std::size_t>(b.j(k))]);
+  const auto in_batches = [&](const auto& visit) {
+    parallel(static_cast<int>(batches.size()), [&](int number) {
+      const Batch& b = batches[static_cast<std::size_t>(number)];
+      visit(b);
+    });
   };
-  for_each([&](const Batch&, std::size_t, std::int32_t ri, std::int32_t rj) {
-    ++all.start[static_cast<std::size_t>(std::min(ri, rj)) + 1];
+  in_batches([&](const Batch& b) {
+    for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k)
+      if (has_history(b, k)) ++all.start[static_cast<std::size_t>(b.i[k]) + 1];
   });
   for (std::size_t k = 1; k < all.start.size(); ++k) all.start[k] += all.start[k - 1];
   all.pairs.resize(static_cast<std::size_t>(all.start.back()));
-  PooledVector<std::int32_t> next(all.start.begin(), all.start.end() - 1);
-  for_each([&](const Batch& b, std::size_t k, std::int32_t ri, std::int32_t rj) {
-    const double sign = ri < rj ? 1.0 : -1.0;
-    const std::int32_t low = std::min(ri, rj), at = next[static_cast<std::size_t>(low)]++;
-    all.pairs[static_cast<std::size_t>(at)] = {low, std::max(ri, rj), b.sp[k], sign * b.tx[k], sign * b.ty[k],
-                                               sign * b.tz[k], b.k_t_last.empty() ? 0.0 : b.k_t_last[k]};
+  in_batches([&](const Batch& b) {
+    if (b.first >= p.count) return;
+    auto to = all.pairs.begin() + all.start[static_cast<std::size_t>(b.first)];  // lists are sorted by owner
+    for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k) {
+      if (!has_history(b, k)) continue;
+      const std::int32_t ri = p.rank[static_cast<std::size_t>(b.i[k])], rj = p.rank[static_cast<std::size_t>(b.j(k))];
+      const double sign = ri < rj ? 1.0 : -1.0;
+      *to++ = {std::min(ri, rj), std::max(ri, rj), b.sp[k], sign * b.tx[k], sign * b.ty[k], sign * b.tz[k],
+               b.k_t_last.empty() ? 0.0 : b.k_t_last[k]};
+    }
   });
   return all;
 }
@@ -201,7 +208,7 @@ void prune(std::vector<Batch>& batches, const Particles& p, const Domain& domain
 }
 
 void fill_inner(std::vector<Batch>& batches, const Particles& p, const Domain& domain, const Margins& margins,
-                bool with_k_t, const PairHistories& history, const ParallelFor& parallel) {
+                bool with_k_t, const PairHistories& history, const std::int32_t* bucket, const ParallelFor& parallel) {
   std::vector<std::int64_t> found(batches.size(), 0);
   const Closer close{p.rows.data(), margins.of.data(), domain};
   parallel(static_cast<int>(batches.size()), [&](int k) {
@@ -209,29 +216,23 @@ void fill_inner(std::vector<Batch>& batches, const Particles& p, const Domain& d
     Inner& inner = inner_of_this_thread();
     inner.choose(b, close);
     inner.clear_history(with_k_t);
-    const auto lower_rank = [&](std::size_t to) {
+    for (std::size_t to = 0; to < inner.from.size(); ++to) {
       const auto m = static_cast<std::size_t>(inner.from[to]);
-      return static_cast<std::size_t>(std::min(p.rank[static_cast<std::size_t>(b.outer_i[m])], p.rank[static_cast<std::size_t>(b.outer_j[m])]));
-    };
-    const std::size_t pairs = inner.from.size();
-    for (std::size_t to = 0; to < pairs; ++to) {
-      // Ranks lie anywhere: what the next pairs will read is asked for ahead.
-      if (to + 32 < pairs) __builtin_prefetch(&history.start[lower_rank(to + 32)]);
-      if (to + 16 < pairs) __builtin_prefetch(history.pairs.data() + history.start[lower_rank(to + 16)]);
-      const auto m = static_cast<std::size_t>(inner.from[to]);
-      const std::int32_t ri = p.rank[static_cast<std::size_t>(b.outer_i[m])], rj = p.rank[static_cast<std::size_t>(b.outer_j[m])];
-      const auto low = static_cast<std::size_t>(std::min(ri, rj));
-      const std::int32_t high = std::max(ri, rj);
-      for (std::int32_t h = history.start[low]; h < history.start[low + 1]; ++h) {
-        const PairHistory& entry = history.pairs[static_cast<std::size_t>(h)];
-        if (entry.high != high) continue;
-        const double sign = ri < rj ? 1.0 : -1.0;
-        inner.sp[to] = entry.sp, inner.tx[to] = sign * entry.tx, inner.ty[to] = sign * entry.ty;
-        inner.tz[to] = sign * entry.tz;
-        if (with_k_t) inner.k_t[to] = entry.k_t;
-        ++found[static_cast<std::size_t>(k)];
-        break;
-      }
+      const auto i = static_cast<std::size_t>(b.outer_i[m]), j = static_cast<std::size_t>(b.outer_j[m]);
+      const std::int32_t ri = p.rank[i], rj = p.rank[j], low = std::min(ri, rj), high = std::max(ri, rj);
+      const auto found_in = [&](std::int32_t of) {
+        for (std::int32_t h = history.start[static_cast<std::size_t>(of)]; h < history.start[static_cast<std::size_t>(of) + 1]; ++h) {
+          const PairHistory& entry = history.pairs[static_cast<std::size_t>(h)];
+          if (entry.low != low || entry.high != high) continue;
+          const double sign = ri < rj ? 1.0 : -1.0;
+          inner.sp[to] = entry.sp, inner.tx[to] = sign * entry.tx, inner.ty[to] = sign * entry.ty, inner.tz[to] = sign * entry.tz;
+          if (with_k_t) inner.k_t[to] = entry.k_t;
+          return true;
+        }
+        return false;
+      };
+      // Who owns a pair mostly owned it before.
+      found[static_cast<std::size_t>(k)] += found_in(bucket[i]) || found_in(bucket[j]) ? 1 : 0;
     }
     install(b, inner, p);
   });

@@ -28,13 +28,14 @@ struct PlateHistory {
   double record[8];         // forces of the last pass, kernels/views.h
 };
 
-// All pairs with history, in buckets by their lower rank.
+// All pairs with history, each in the bucket of one of its spheres.
 struct PairHistories {
-  PooledVector<std::int32_t> start;  // bucket of rank r: pairs start[r] .. start[r + 1]
+  PooledVector<std::int32_t> start;  // bucket s: pairs start[s] .. start[s + 1]
   PooledVector<PairHistory> pairs;
+  bool by_place = false;             // a sphere's bucket is its place when they were gathered, as they lie there; else its rank
 };
 
-PairHistories pair_history(const std::vector<Batch>& batches, const Particles& particles);
+PairHistories pair_history(const std::vector<Batch>& batches, const Particles& particles, const ParallelFor& parallel = in_turn);
 // All history with planes, sorted by (plate, rank).
 std::vector<PlateHistory> plate_history(const std::vector<Batch>& batches, const Particles& particles);
 
@@ -44,9 +45,10 @@ std::vector<PlateHistory> plate_history(const std::vector<Batch>& batches, const
 void prune(std::vector<Batch>& batches, const Particles& particles, const Domain& domain, const Margins& margins,
            bool with_k_t, const ParallelFor& parallel);
 
-// The same for fresh batches without inner lists.
+// The same for fresh batches without inner lists. bucket[place]: where `history` has a sphere's pairs. Throws std::logic_error if not all of
+// `history` is carried.
 void fill_inner(std::vector<Batch>& batches, const Particles& particles, const Domain& domain, const Margins& margins,
-                bool with_k_t, const PairHistories& history, const ParallelFor& parallel);
+                bool with_k_t, const PairHistories& history, const std::int32_t* bucket, const ParallelFor& parallel);
 
 // Lists of the spheres closer to a present plane than their margins and `gap`, with history from `history` (sorted).
 void list_plates(std::vector<Batch>& batches, const Particles& particles, const Planes& planes, std::int64_t step,

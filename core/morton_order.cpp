@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 namespace platen {
 
@@ -92,24 +93,37 @@ class Sweep {
 
 }  // namespace
 
-std::vector<std::int32_t> morton_order(const Particles& particles, int layer) {
+std::vector<std::int32_t> morton_order(const Particles& particles, int layer, const ParallelFor& parallel) {
   const auto n = static_cast<std::size_t>(particles.count);
   const Sweep sweep(particles, layer);
   PooledVector<std::uint64_t> keys(n), other_keys(n);
   std::vector<std::int32_t> order(n), other_order(n);
-  for (std::size_t k = 0; k < n; ++k) keys[k] = sweep.key(k), order[k] = static_cast<std::int32_t>(k);
-  constexpr int digit_bits = 11, passes = (Sweep::inside_bits + Sweep::layer_bits + Sweep::bar_bits) / digit_bits;
+  for_each_in_stretches(n, parallel, [&](std::size_t k) { keys[k] = sweep.key(k), order[k] = static_cast<std::int32_t>(k); });
+  // Digit by digit from the last. Each stretch counts its own, then puts them behind those of the stretches before.
+  constexpr int digit_bits = 11, digits = 1 << digit_bits, passes = (Sweep::inside_bits + Sweep::layer_bits + Sweep::bar_bits) / digit_bits;
   static_assert(passes * digit_bits == Sweep::inside_bits + Sweep::layer_bits + Sweep::bar_bits);
+  const int parts = stretches_of(n);
+  std::vector<std::array<std::uint32_t, digits>> start(static_cast<std::size_t>(parts));
   for (int pass = 0; pass < passes; ++pass) {
-    std::array<std::uint32_t, (1 << digit_bits) + 1> start{};
-    const auto digit = [&](std::uint64_t key) { return static_cast<std::size_t>(key >> (digit_bits * pass) & ((1 << digit_bits) - 1)); };
-    for (const std::uint64_t key : keys) ++start[digit(key) + 1];
-    for (std::size_t d = 1; d < start.size(); ++d) start[d] += start[d - 1];
-    for (std::size_t k = 0; k < n; ++k) {
-      const std::uint32_t to = start[digit(keys[k])]++;
-      other_keys[to] = keys[k];
-      other_order[to] = order[k];
-    }
+    const auto digit = [&](std::uint64_t key) { return static_cast<std::size_t>(key >> (digit_bits * pass) & (digits - 1)); };
+    parallel(parts, [&](int part) {
+      auto& own = start[static_cast<std::size_t>(part)];
+      own.fill(0);
+      const IndexRange range = stretch(n, part);
+      for (std::size_t k = range.first; k < range.last; ++k) ++own[digit(keys[k])];
+    });
+    std::uint32_t before = 0;
+    for (std::size_t d = 0; d < digits; ++d)
+      for (auto& of_part : start) before += std::exchange(of_part[d], before);
+    parallel(parts, [&](int part) {
+      auto& own = start[static_cast<std::size_t>(part)];
+      const IndexRange range = stretch(n, part);
+      for (std::size_t k = range.first; k < range.last; ++k) {
+        const std::uint32_t to = own[digit(keys[k])]++;
+        other_keys[to] = keys[k];
+        other_order[to] = order[k];
+      }
+    });
     keys.swap(other_keys), order.swap(other_order);
   }
   return order;

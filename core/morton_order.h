@@ -21,6 +21,6 @@ namespace platen {
 // or a periodic side. A curve that folds in all three directions leaves more of them further behind [docs/decisions.md].
 // layer: 0 = chosen: 500, or 1,000 in beds with layers of more than 3,000, so that a batch is a thin slice of a bar and a group of
 // batches in the cache gets through several steps [core/task_order.h].
-std::vector<std::int32_t> morton_order(const Particles& particles, int layer = 0);
+std::vector<std::int32_t> morton_order(const Particles& particles, int layer = 0, const ParallelFor& parallel = in_turn);
 
 }  // namespace platen

@@ -8,17 +8,11 @@
 
 #include "core/batches.h"
 #include "core/margins.h"
+#include "core/parallel_for.h"
 #include "core/particles.h"
 #include "kernels/kernel_table.h"
 
 namespace platen {
-
-// Calls body(k) for k = 0 .. count-1, in any order, on any thread.
-using ParallelFor = std::function<void(int count, const std::function<void(int)>& body)>;
-// One after the other, on the calling thread.
-inline void in_turn(int count, const std::function<void(int)>& body) {
-  for (int k = 0; k < count; ++k) body(k);
-}
 
 struct Domain {
   double width = 0.0, depth = 0.0;  // periodic lengths [m]; 0 where not periodic

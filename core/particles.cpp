@@ -1,5 +1,7 @@
 #include "core/particles.h"
 
+#include <algorithm>
+
 #include "kernels/views.h"
 
 namespace platen {
@@ -20,43 +22,42 @@ void Particles::resize(std::int32_t n, bool equal_spheres) {
   id_of_rank.assign(static_cast<std::size_t>(n), 0);
 }
 
-namespace {
-template <class Array>
-void reorder(Array& column, const std::vector<std::int32_t>& order, PooledVector<double>& scratch) {
-  for (std::size_t k = 0; k < order.size(); ++k) scratch[k] = column[static_cast<std::size_t>(order[k])];
-  for (std::size_t k = 0; k < order.size(); ++k) column[k] = scratch[k];
-}
-}  // namespace
-
-void Particles::permute(const std::vector<std::int32_t>& order) {
-  PooledVector<double> scratch(order.size());
-  for (auto* column : {&x, &y, &z, &vx, &vy, &vz, &ux, &uy, &uz}) reorder(*column, order, scratch);
+void Particles::permute(const std::vector<std::int32_t>& order, const ParallelFor& parallel) {
+  const std::size_t n = order.size();
+  AlignedArray<double> scratch;
+  scratch.assign(static_cast<std::size_t>(padded), 0.0);
+  const auto reorder = [&](AlignedArray<double>& column) {
+    for_each_in_stretches(n, parallel, [&](std::size_t k) { scratch[k] = column[static_cast<std::size_t>(order[k])]; });
+    std::copy(column.begin() + static_cast<std::ptrdiff_t>(n), column.end(), scratch.begin() + static_cast<std::ptrdiff_t>(n));
+    column.swap(scratch);
+  };
+  for (auto* column : {&x, &y, &z, &vx, &vy, &vz, &ux, &uy, &uz}) reorder(*column);
   if (!equal)
-    for (auto* column : {&radius, &inverse_radius, &mass, &inverse_mass}) reorder(*column, order, scratch);
-  PooledVector<std::int32_t> ranks(order.size()), images(2 * order.size());
-  for (std::size_t k = 0; k < order.size(); ++k) {
+    for (auto* column : {&radius, &inverse_radius, &mass, &inverse_mass}) reorder(*column);
+  PooledVector<std::int32_t> ranks(n), images(2 * n);
+  for_each_in_stretches(n, parallel, [&](std::size_t k) {
     const auto from = static_cast<std::size_t>(order[k]);
     ranks[k] = rank[from];
     images[2 * k] = image[2 * from];
     images[2 * k + 1] = image[2 * from + 1];
-  }
-  for (std::size_t k = 0; k < order.size(); ++k) {
+  });
+  for_each_in_stretches(n, parallel, [&](std::size_t k) {
     rank[k] = ranks[k];
     image[2 * k] = images[2 * k];
     image[2 * k + 1] = images[2 * k + 1];
     place[static_cast<std::size_t>(ranks[k])] = static_cast<std::int32_t>(k);
-  }
-  write_rows();
+  });
+  write_rows(parallel);
 }
 
-void Particles::write_rows() {
-  for (std::size_t k = 0; k < static_cast<std::size_t>(padded); ++k) {
+void Particles::write_rows(const ParallelFor& parallel) {
+  for_each_in_stretches(static_cast<std::size_t>(padded), parallel, [this](std::size_t k) {
     double* row = rows.data() + row_size * k;
     const double R = equal ? common_radius : radius[k];
     row[0] = x[k], row[1] = y[k], row[2] = z[k], row[3] = R;
     row[4] = vx[k], row[5] = vy[k], row[6] = vz[k], row[7] = equal ? common_mass : mass[k];
     row[8] = ux[k], row[9] = uy[k], row[10] = uz[k], row[11] = 1.0 / R;
-  }
+  });
 }
 
 void Particles::read_rows() {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/aligned.h"
+#include "core/parallel_for.h"
 
 namespace platen {
 
@@ -31,9 +32,9 @@ struct Particles {
   double mass_of(std::int32_t p) const { return equal ? common_mass : mass[static_cast<std::size_t>(p)]; }
 
   void resize(std::int32_t n, bool equal_spheres);
-  void permute(const std::vector<std::int32_t>& order);  // order[new place] = old place
-  void write_rows();                                     // rows from the arrays
-  void read_rows();                                      // the other way round
+  void permute(const std::vector<std::int32_t>& order, const ParallelFor& parallel = in_turn);  // order[new place] = old place
+  void write_rows(const ParallelFor& parallel = in_turn);  // rows from the arrays
+  void read_rows();                                        // the other way round
 };
 
 // Mass of a sphere, 4/3 pi R^3 rho [kg].

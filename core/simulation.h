@@ -169,7 +169,7 @@ class Simulation {
   void rebuild();
   void rebuild_with(const PairHistories& pairs);
   int batch_size(bool even) const;
-  void cut_into_batches(const PairHistories& pairs, int size);
+  void cut_into_batches(const PairHistories& pairs, const std::int32_t* bucket, int size);
   void rebuild_from(const PairHistories& pairs, const std::vector<PlateHistory>& plates, const AlignedArray<double>* sums);
   void take_sides_away();
   void prune_lists();

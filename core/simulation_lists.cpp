@@ -322,7 +322,7 @@ void Simulation::prune_lists() {
   ++counters_.prunes;
 }
 
-void Simulation::rebuild() { rebuild_with(pair_history(batches_, particles_)); }
+void Simulation::rebuild() { rebuild_with(pair_history(batches_, particles_, on_workers())); }
 
 void Simulation::rebuild_with(const PairHistories& pairs) {
   AlignedArray<double> sums;
@@ -337,12 +337,12 @@ int Simulation::batch_size(bool even) const {
   return std::min(engine_.batch > 0 ? engine_.batch : automatic_batch(particles_.count, engine_.threads, even), 1 << 21);
 }
 
-void Simulation::cut_into_batches(const PairHistories& pairs, int size) {
+void Simulation::cut_into_batches(const PairHistories& pairs, const std::int32_t* bucket, int size) {
   const ParallelFor run = on_workers();
   batches_.clear();  // before the new ones are made: their memory serves again
   const Ownership ownership = engine_.fused ? Ownership::by_colour : Ownership::ahead;
   batches_ = make_batches(particles_, domain_, outer_, size, ownership, kernels_, run);
-  fill_inner(batches_, particles_, domain_, inner_, keeps_k_t(), pairs, run);
+  fill_inner(batches_, particles_, domain_, inner_, keeps_k_t(), pairs, bucket, run);
   const double bytes = touched_bytes(batches_);
   asks_ahead_ = bytes > 0.5 * engine_.cache * engine_.threads;
   asks_history_ = bytes > 2.0 * engine_.cache;
@@ -353,13 +353,15 @@ void Simulation::rebuild_from(const PairHistories& pairs, const std::vector<Plat
   const ParallelFor run = on_workers();
   // Fused, two batches would take turns.
   const bool even = engine_.threads == 2 && !engine_.fused && (batches_.empty() || work_is_even(batches_, engine_.threads));
-  particles_.permute(morton_order(particles_));
+  const std::vector<std::int32_t> order = morton_order(particles_, 0, run);
+  particles_.permute(order, run);
+  const std::int32_t* const bucket = pairs.by_place ? order.data() : particles_.rank.data();
   choose_margins(true);
   graph_.reset();
   table_.reset();
-  cut_into_batches(pairs, batch_size(even));
+  cut_into_batches(pairs, bucket, batch_size(even));
   // Nobody knew at first, and of two batches one may have the border to itself.
-  if (even && batch_size(false) != batch_size(true) && !work_is_even(batches_, engine_.threads)) cut_into_batches(pairs, batch_size(false));
+  if (even && batch_size(false) != batch_size(true) && !work_is_even(batches_, engine_.threads)) cut_into_batches(pairs, bucket, batch_size(false));
   list_plates(batches_, particles_, planes_, step_, inner_, plate_gap_, plates, run);
   merged_.assign(batches_.size(), 1);
   if (sums != nullptr) put_sums(*sums);
@@ -394,11 +396,12 @@ void Simulation::open_sides() {
   // Every centre is inside the box already; pairs that met through a face are apart from now on.
   FixedSum before(energy_unit_), after(energy_unit_);
   add_pair_energy(before);
-  const PairHistories all = pair_history(batches_, particles_);
+  const PairHistories all = pair_history(batches_, particles_, on_workers());
   PairHistories kept;
+  kept.by_place = all.by_place;
   kept.start.assign(1, 0);
-  for (std::size_t low = 0; low + 1 < all.start.size(); ++low) {
-    for (std::int32_t k = all.start[low]; k < all.start[low + 1]; ++k) {
+  for (std::size_t bucket = 0; bucket + 1 < all.start.size(); ++bucket) {
+    for (std::int32_t k = all.start[bucket]; k < all.start[bucket + 1]; ++k) {
       const PairHistory& h = all.pairs[static_cast<std::size_t>(k)];
       const auto a = static_cast<std::size_t>(particles_.place[static_cast<std::size_t>(h.low)]);
       const auto b = static_cast<std::size_t>(particles_.place[static_cast<std::size_t>(h.high)]);

@@ -90,6 +90,30 @@ TEST(MortonOrder, LayersGrowWithTheBed) {
   EXPECT_NE(morton_order(large), morton_order(large, 500));
 }
 
+// Stretches of the bed are sorted by whoever comes, in any order.
+TEST(MortonOrder, SharedAmongThreads) {
+  const Particles p = grid(40, 40, 30);
+  ASSERT_GT(stretches_of(static_cast<std::size_t>(p.count)), 4);
+  int bodies = 0;
+  const ParallelFor backwards = [&](int count, const std::function<void(int)>& body) {
+    for (int k = count; k-- > 0; ++bodies) body(k);
+  };
+  const std::vector<std::int32_t> order = morton_order(p);
+  EXPECT_EQ(order, morton_order(p, 0, backwards));
+  Particles alone = grid(40, 40, 30), shared = grid(40, 40, 30);
+  alone.permute(order), shared.permute(order, backwards);
+  EXPECT_GT(bodies, 100);
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const auto from = static_cast<std::size_t>(order[k]);
+    ASSERT_EQ(shared.x[k], p.x[from]);
+    ASSERT_EQ(shared.z[k], p.z[from]);
+    ASSERT_EQ(shared.rank[k], p.rank[from]);
+    ASSERT_EQ(shared.place[static_cast<std::size_t>(shared.rank[k])], static_cast<std::int32_t>(k));
+    ASSERT_EQ(shared.rows[row_size * k + 1], p.y[from]);
+  }
+  EXPECT_EQ(alone.place, shared.place);
+}
+
 TEST(MortonOrder, OfNothing) { EXPECT_TRUE(morton_order(Particles()).empty()); }
 
 // One layer of a bar is 200 spheres here: partners in it and in the next one lie within two layers. What is further away
