@@ -23,11 +23,11 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
   GatheredPairs<Wide, scene> gathered;
   typename I::Real shortest_lever = I::set(1.0);
   ActiveVectors active;
-  AskForOthers others;
+  AskForOthers<I> others;
   for (std::int32_t start = 0; start < b.count; start += chunk_size) {
     const int count = start + chunk_size < b.count ? chunk_size : b.count - start;
     ask_ahead<scene>(b, start);
-    others.chunk(b);
+    if (b.stretches != 0) others.chunk(b);
     if (c.width > 0.0)
       for (int at = 0; at < count; at += I::width) fetch_geometry<I, scene, exact, true>(chunk, at, b, c, start + at);
     else
