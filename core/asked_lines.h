@@ -30,7 +30,7 @@ class StretchesOfLines {
 
  private:
   static constexpr std::int64_t line = 64;
-  std::array<AskedLines, 96> stretches_;
+  std::array<AskedLines, 128> stretches_;
   std::size_t count_ = 0;
   std::int64_t lines_ = 0;
 };

@@ -103,7 +103,7 @@ std::vector<std::int32_t> morton_order(const Particles& particles, int layer, co
   constexpr int digit_bits = 11, digits = 1 << digit_bits, passes = (Sweep::inside_bits + Sweep::layer_bits + Sweep::bar_bits) / digit_bits;
   static_assert(passes * digit_bits == Sweep::inside_bits + Sweep::layer_bits + Sweep::bar_bits);
   const int parts = stretches_of(n);
-  std::vector<std::array<std::uint32_t, digits>> start(static_cast<std::size_t>(parts));
+  std::vector<std::array<std::uint32_t, digits + 16>> start(static_cast<std::size_t>(parts));  // a little more: counters of one digit in different sets of the cache
   for (int pass = 0; pass < passes; ++pass) {
     const auto digit = [&](std::uint64_t key) { return static_cast<std::size_t>(key >> (digit_bits * pass) & (digits - 1)); };
     parallel(parts, [&](int part) {

@@ -30,7 +30,7 @@ Bounds bounds_of(const Particles& p) {
 // A grid of cells at least `reach` wide over the particles; periodic where the domain is.
 class CellGrid {
  public:
-  CellGrid(const Particles& p, const Domain& domain, const Margins& margins, double reach, const ParallelFor& parallel) {
+  CellGrid(const Particles& p, const Domain& domain, const Margins& margins, double reach) {
     const Bounds b = bounds_of(p);
     const double periodic[3] = {domain.width, domain.depth, 0.0};
     double extent[3];
@@ -52,21 +52,22 @@ class CellGrid {
       inverse_[axis] = cells_[axis] / extent[axis];
     }
     start_.assign(static_cast<std::size_t>(cells_[0]) * cells_[1] * cells_[2] + 1, 0);
-    const auto count = static_cast<std::size_t>(p.count);
-    PooledVector<std::int32_t> at(count);  // of each particle: its cell, then its place among the members
-    for_each_in_stretches(count, parallel, [&](std::size_t k) { at[k] = index(coordinate(p.x[k], 0), coordinate(p.y[k], 1), coordinate(p.z[k], 2)); });
-    for (std::size_t k = 0; k < count; ++k) ++start_[static_cast<std::size_t>(at[k]) + 1];
+    cell_of_.resize(static_cast<std::size_t>(p.count));
+    for (std::int32_t k = 0; k < p.count; ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      cell_of_[at] = index(coordinate(p.x[at], 0), coordinate(p.y[at], 1), coordinate(p.z[at], 2));
+      ++start_[static_cast<std::size_t>(cell_of_[at]) + 1];
+    }
     for (std::size_t c = 1; c < start_.size(); ++c) start_[c] += start_[c - 1];
-    for (auto* column : {&x_, &y_, &z_, &reach_, &number_}) column->resize(count + padding);
-    particle_.resize(count + padding);
+    for (auto* column : {&x_, &y_, &z_, &reach_, &number_}) column->resize(static_cast<std::size_t>(p.count + padding));
+    particle_.resize(static_cast<std::size_t>(p.count + padding));
     PooledVector<std::int32_t> next(start_.begin(), start_.end() - 1);
-    for (std::size_t k = 0; k < count; ++k) at[k] = next[static_cast<std::size_t>(at[k])]++;
-    for_each_in_stretches(count, parallel, [&](std::size_t k) {
-      const double* row = p.rows.data() + row_size * k;
-      const auto to = static_cast<std::size_t>(at[k]);
-      x_[to] = row[0], y_[to] = row[1], z_[to] = row[2], reach_[to] = row[3] + margins.of[k];
-      number_[to] = static_cast<double>(k), particle_[to] = static_cast<std::int32_t>(k);
-    });
+    for (std::int32_t k = 0; k < p.count; ++k) {
+      const double* row = p.rows.data() + row_size * static_cast<std::size_t>(k);
+      const auto at = static_cast<std::size_t>(next[static_cast<std::size_t>(cell_of_[static_cast<std::size_t>(k)])]++);
+      x_[at] = row[0], y_[at] = row[1], z_[at] = row[2], reach_[at] = row[3] + margins.of[static_cast<std::size_t>(k)];
+      number_[at] = k, particle_[at] = k;
+    }
     lengths_[0] = domain.width, lengths_[1] = domain.depth, lengths_[2] = 0.0;
     members_ = {x_.data(), y_.data(), z_.data(), reach_.data(), number_.data(), particle_.data(), 0.0, 0.0, 0.0, 0.0};
     // A periodic axis with one or two cells: images are looked for pair by pair.
@@ -126,7 +127,7 @@ class CellGrid {
   bool wraps_[3];
   double low_[3], inverse_[3], lengths_[3];
   int cells_[3];
-  PooledVector<std::int32_t> start_;
+  PooledVector<std::int32_t> start_, cell_of_;
   PooledVector<double> x_, y_, z_, reach_, number_;
   PooledVector<std::int32_t> particle_;
   SearchMembers members_;
@@ -215,7 +216,7 @@ std::vector<Batch> make_batches(const Particles& p, const Domain& domain, const 
 
   double largest = p.common_radius;
   if (!p.equal) largest = *std::max_element(p.radius.begin(), p.radius.begin() + p.count);
-  const CellGrid grid(p, domain, margins, 2.0 * (largest + margins.largest), parallel);
+  const CellGrid grid(p, domain, margins, 2.0 * (largest + margins.largest));
 
   // Every pair within a batch once, every pair across batches from both sides; then the owner keeps it.
   parallel(count, [&](int k) {

@@ -319,10 +319,10 @@ void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, 
   // By the last pass, which may have had the list before a prune; none after a rebuild. Whether pairs are passed over changes no bit.
   const bool dense = 4 * b.pair_totals.contacts > 3 * std::int64_t{b.padded};
   PairBatch pairs{particles_.rows.data(), b.i.data(), b.row_j.data(), b.to.data(), b.sp.data(), b.tx.data(),
-                        b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum.data(), b.first, b.padded, b.first + b.count, nothing, dense, leap,
-                        particles_.x.data(), particles_.y.data(), particles_.z.data(), particles_.vx.data(),
-                        particles_.vy.data(), particles_.vz.data(), particles_.ux.data(), particles_.uy.data(),
-                        particles_.uz.data(), dense && asks_ahead_ ? b.ahead : 0, particles_.padded, asks_history_, nullptr, 0, 0};
+                  b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum.data(), b.first, b.padded, b.first + b.count, nothing, dense, leap,
+                  particles_.x.data(), particles_.y.data(), particles_.z.data(), particles_.vx.data(),
+                  particles_.vy.data(), particles_.vz.data(), particles_.ux.data(), particles_.uy.data(),
+                  particles_.uz.data(), dense && asks_ahead_ ? b.ahead : 0, particles_.padded, asks_history_, nullptr, 0, 0};
   if (asked != nullptr) asked->put_into(pairs);
   b.pair_totals.contacts = 0;
   kernels_.contacts(pairs, law, b.pair_totals);
@@ -362,11 +362,13 @@ StretchesOfLines Simulation::lines_of(const std::vector<Asked>& asks) const {
   StretchesOfLines lines;
   const Particles& p = particles_;
   for (const Asked& a : asks) {
+    if (a.offset >= steps_of_run_) continue;
     const Batch& b = batches_[static_cast<std::size_t>(a.batch)];
     const auto first = static_cast<std::size_t>(b.first), count = static_cast<std::size_t>(b.count), listed = static_cast<std::size_t>(b.padded);
     const auto add = [&](const auto* array, std::size_t size) { lines.add(array, size, a.from, a.to); };
     if (a.contacts) {
-      for (const auto* column : {&b.sp, &b.tx, &b.ty, &b.tz, &b.k_t_last})
+      if (built_scenes[static_cast<std::size_t>(kernels_.scene)].traits.plasticity) add(b.sp.data(), listed);
+      for (const auto* column : {&b.tx, &b.ty, &b.tz, &b.k_t_last})
         if (!column->empty()) add(column->data(), listed);
       add(b.i.data(), listed), add(b.row_j.data(), listed), add(b.to.data(), listed);
       continue;
@@ -414,6 +416,7 @@ void Simulation::collect() {
 }
 
 void Simulation::run_chunk(int steps) {
+  steps_of_run_ = steps;
   law_.dt = plate_law_.dt = dt_;
   motion_.kick = motion_.drift = dt_;
   motion_.mean_x = mean_[0], motion_.mean_y = mean_[1], motion_.mean_z = mean_[2];
@@ -430,7 +433,6 @@ void Simulation::run_chunk(int steps) {
 void Simulation::prepare_graph() {
   if (table_) return;
   graph_.reset();
-  asks_.clear();
   table_ = std::make_unique<TaskTable>(batches_, unroll_, engine_.fused);
   const bool alone = engine_.threads == 1 || engine_.executor == Executor::serial;
   const double cache = order_if_large(*table_, batches_, engine_.cache, engine_.executor == Executor::flow_graph ? engine_.threads : 1, on_workers());

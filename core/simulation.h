@@ -146,6 +146,7 @@ class Simulation {
   const std::vector<Batch>& batches() const { return batches_; }
   const Particles& state() const { return particles_; }
   const TaskAsks& asks() const { return asks_; }
+  StretchesOfLines lines_of(const std::vector<Asked>& asks) const;  // of those that a run of steps will need, where they lie
   const LawConstants& law() const { return law_; }
   const PlateConstants& plate_law() const { return plate_law_; }
   void rebuild_now();
@@ -163,7 +164,6 @@ class Simulation {
   enum class Sums { old, put_aside, cleared };  // what a pass over the contacts finds
   void contacts(Batch& batch, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law, Sums found,
                 const StretchesOfLines* asked = nullptr);
-  StretchesOfLines lines_of(const std::vector<Asked>& asks) const;
   void run_task(const Task& task);
   void collect();
   void rebuild();
@@ -254,6 +254,7 @@ class Simulation {
   int unroll_ = 1;               // steps of the graph
   bool asks_ahead_ = false, asks_history_ = false;  // kernels/ask_ahead.h
 
+  int steps_of_run_ = 0;
   TaskAsks asks_;  // of the table's tasks; empty where none asks
   std::unique_ptr<TaskTable> table_;
   std::unique_ptr<FlowGraph> graph_;

@@ -359,6 +359,7 @@ void Simulation::rebuild_from(const PairHistories& pairs, const std::vector<Plat
   choose_margins(true);
   graph_.reset();
   table_.reset();
+  asks_.clear();
   cut_into_batches(pairs, bucket, batch_size(even));
   // Nobody knew at first, and of two batches one may have the border to itself.
   if (even && batch_size(false) != batch_size(true) && !work_is_even(batches_, engine_.threads)) cut_into_batches(pairs, bucket, batch_size(false));

@@ -38,7 +38,7 @@ TaskAsks asks_of_tasks(const TaskTable& table, const std::vector<Batch>& batches
         const double part = std::min(host.room, left);
         if (part < std::min(least_asked, missing) || asks[host.task].size() == most_asked) continue;
         host.room -= part;
-        asks[host.task].push_back({task.batch, contacts, (left - part) / missing, left / missing});
+        asks[host.task].push_back({task.batch, contacts, (left - part) / missing, left / missing, task.offset});
         left -= part;
       }
     };

@@ -20,6 +20,7 @@ struct Asked {
   std::int32_t batch;
   bool contacts;
   double from, to;  // shares of each of its arrays, 0 to 1
+  int offset;       // step of the task that needs it: runs may be shorter than the table
 };
 
 // What the order for a cache counts on is part of one; tasks ask for what this many times as much would not hold either.

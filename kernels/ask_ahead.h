@@ -45,13 +45,18 @@ PLATEN_INLINE void ask_ahead(const PairBatch& b, std::int32_t start) {
 template <class I>
 class AskForOthers {
  public:
-  [[gnu::noinline]] void chunk(const PairBatch& b) {
-    for (std::int64_t left = b.lines_of_chunk; left > 0 && stretch_ < b.stretches;) {
-      const AskedLines& lines = b.lines[stretch_];
-      const std::int64_t end = line_ + left < lines.count ? line_ + left : lines.count;
+  // What is asked for with one chunk: `of_chunk` lines, from where the chunk before left off.
+  [[gnu::noinline]] void chunk(const AskedLines* lines, std::int32_t stretches, std::int32_t of_chunk) {
+    walk(lines, stretches, of_chunk, [](const char* line) { __builtin_prefetch(line, 0, 2); });  // into the second cache
+  }
+  template <class Ask>
+  PLATEN_INLINE void walk(const AskedLines* lines, std::int32_t stretches, std::int32_t of_chunk, const Ask& ask) {
+    for (std::int64_t left = of_chunk; left > 0 && stretch_ < stretches;) {
+      const AskedLines& of = lines[stretch_];
+      const std::int64_t end = line_ + left < of.count ? line_ + left : of.count;
       left -= end - line_;
-      for (; line_ < end; ++line_) __builtin_prefetch(lines.first + 64 * line_, 0, 2);  // into the second cache
-      if (line_ == lines.count) ++stretch_, line_ = 0;
+      for (; line_ < end; ++line_) ask(of.first + 64 * line_);
+      if (line_ == of.count) ++stretch_, line_ = 0;
     }
   }
 

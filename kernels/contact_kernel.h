@@ -27,7 +27,7 @@ void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairT
   for (std::int32_t start = 0; start < b.count; start += chunk_size) {
     const int count = start + chunk_size < b.count ? chunk_size : b.count - start;
     ask_ahead<scene>(b, start);
-    if (b.stretches != 0) others.chunk(b);
+    if (b.stretches != 0) others.chunk(b.lines, b.stretches, b.lines_of_chunk);
     if (c.width > 0.0)
       for (int at = 0; at < count; at += I::width) fetch_geometry<I, scene, exact, true>(chunk, at, b, c, start + at);
     else

@@ -92,26 +92,55 @@ TEST(MortonOrder, LayersGrowWithTheBed) {
 
 // Stretches of the bed are sorted by whoever comes, in any order.
 TEST(MortonOrder, SharedAmongThreads) {
-  const Particles p = grid(40, 40, 30);
-  ASSERT_GT(stretches_of(static_cast<std::size_t>(p.count)), 4);
-  int bodies = 0;
-  const ParallelFor backwards = [&](int count, const std::function<void(int)>& body) {
-    for (int k = count; k-- > 0; ++bodies) body(k);
+  const Particles places = grid(40, 40, 30);
+  const auto bed = [&](bool equal) {  // three spheres fewer, so that a vector is filled up
+    Particles p;
+    p.resize(places.count - 3, equal);
+    p.common_radius = 0.5, p.common_mass = 2.0;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(p.count); ++k) {
+      p.rank[k] = static_cast<std::int32_t>(k);
+      p.x[k] = places.x[k], p.y[k] = places.y[k], p.z[k] = places.z[k], p.vx[k] = 1.0 + static_cast<double>(k);
+      p.image[2 * k] = static_cast<std::int32_t>(k), p.image[2 * k + 1] = -static_cast<std::int32_t>(k);
+      if (!equal) p.radius[k] = 0.4 + 1e-6 * static_cast<double>(k);
+    }
+    return p;
   };
-  const std::vector<std::int32_t> order = morton_order(p);
-  EXPECT_EQ(order, morton_order(p, 0, backwards));
-  Particles alone = grid(40, 40, 30), shared = grid(40, 40, 30);
-  alone.permute(order), shared.permute(order, backwards);
-  EXPECT_GT(bodies, 100);
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    const auto from = static_cast<std::size_t>(order[k]);
-    ASSERT_EQ(shared.x[k], p.x[from]);
-    ASSERT_EQ(shared.z[k], p.z[from]);
-    ASSERT_EQ(shared.rank[k], p.rank[from]);
-    ASSERT_EQ(shared.place[static_cast<std::size_t>(shared.rank[k])], static_cast<std::int32_t>(k));
-    ASSERT_EQ(shared.rows[row_size * k + 1], p.y[from]);
+  for (const bool equal : {true, false}) {
+    const Particles before = bed(equal);
+    Particles p = bed(equal);
+    ASSERT_NE(p.count, p.padded);
+    ASSERT_GT(stretches_of(static_cast<std::size_t>(p.count)), 4);
+    int bodies = 0;
+    const ParallelFor backwards = [&](int count, const std::function<void(int)>& body) {
+      for (int k = count; k-- > 0; ++bodies) body(k);
+    };
+    const std::vector<std::int32_t> order = morton_order(p);
+    EXPECT_EQ(order, morton_order(p, 0, backwards));
+    EXPECT_GT(std::exchange(bodies, 0), 0);
+    p.permute(order, backwards);
+    EXPECT_GT(bodies, 0);
+    for (std::size_t k = 0; k < order.size(); ++k) {
+      const auto from = static_cast<std::size_t>(order[k]);
+      ASSERT_EQ(p.x[k], before.x[from]);
+      ASSERT_EQ(p.vx[k], before.vx[from]);
+      ASSERT_EQ(p.radius_of(static_cast<std::int32_t>(k)), before.radius_of(order[k]));
+      ASSERT_EQ(p.rank[k], order[k]);
+      ASSERT_EQ(p.image[2 * k], order[k]);
+      ASSERT_EQ(p.image[2 * k + 1], -order[k]);
+      ASSERT_EQ(p.place[from], static_cast<std::int32_t>(k));
+    }
+    for (auto k = static_cast<std::size_t>(p.count); k < static_cast<std::size_t>(p.padded); ++k) {
+      EXPECT_EQ(p.x[k], 0.0);
+      EXPECT_EQ(p.rank[k], -1);
+      if (!equal) {
+        EXPECT_EQ(p.radius[k], 1.0);
+      }
+    }
+    const AlignedArray<double> rows = std::move(p.rows);
+    p.rows.assign(rows.size(), -1.0);
+    p.write_rows();
+    EXPECT_TRUE(std::equal(rows.begin(), rows.end(), p.rows.begin()));
   }
-  EXPECT_EQ(alone.place, shared.place);
 }
 
 TEST(MortonOrder, OfNothing) { EXPECT_TRUE(morton_order(Particles()).empty()); }

@@ -79,6 +79,8 @@ TEST(TaskOrder, KeepsTasksAndEdges) {
         EXPECT_TRUE(table.ordered());
         for (std::size_t k = 0; k < order.size(); ++k) {
           const auto t = static_cast<std::size_t>(order[k]);
+          EXPECT_EQ(table.tasks()[k].number, static_cast<std::int32_t>(k));
+          EXPECT_EQ(plain.tasks()[t].number, static_cast<std::int32_t>(t));
           EXPECT_EQ(table.tasks()[k].kind, plain.tasks()[t].kind);
           EXPECT_EQ(table.tasks()[k].batch, plain.tasks()[t].batch);
           EXPECT_EQ(table.tasks()[k].offset, plain.tasks()[t].offset);
