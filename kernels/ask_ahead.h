@@ -45,19 +45,31 @@ PLATEN_INLINE void ask_ahead(const PairBatch& b, std::int32_t start) {
 template <class I>
 class AskForOthers {
  public:
+  // Lines one after the other from `first` on; none: nothing is left.
+  struct Piece {
+    const char* first;
+    std::int64_t lines;
+  };
+
   // What is asked for with one chunk: `of_chunk` lines, from where the chunk before left off.
   [[gnu::noinline]] void chunk(const AskedLines* lines, std::int32_t stretches, std::int32_t of_chunk) {
-    walk(lines, stretches, of_chunk, [](const char* line) { __builtin_prefetch(line, 0, 2); });  // into the second cache
-  }
-  template <class Ask>
-  PLATEN_INLINE void walk(const AskedLines* lines, std::int32_t stretches, std::int32_t of_chunk, const Ask& ask) {
-    for (std::int64_t left = of_chunk; left > 0 && stretch_ < stretches;) {
-      const AskedLines& of = lines[stretch_];
-      const std::int64_t end = line_ + left < of.count ? line_ + left : of.count;
-      left -= end - line_;
-      for (; line_ < end; ++line_) ask(of.first + 64 * line_);
-      if (line_ == of.count) ++stretch_, line_ = 0;
+    for (std::int64_t left = of_chunk; left > 0;) {
+      const Piece piece = next(lines, stretches, left);
+      if (piece.lines == 0) return;
+      // In no function of its own: g++ takes one that does nothing else for one that does nothing, and leaves out its calls
+      // [tests/check_prefetches.cmake].
+      for (std::int64_t k = 0; k < piece.lines; ++k) __builtin_prefetch(piece.first + 64 * k, 0, 2);  // into the second cache
+      left -= piece.lines;
     }
+  }
+  // At most so many of the lines that come next.
+  PLATEN_INLINE Piece next(const AskedLines* lines, std::int32_t stretches, std::int64_t most) {
+    while (stretch_ < stretches && line_ == lines[stretch_].count) ++stretch_, line_ = 0;
+    if (stretch_ == stretches) return {nullptr, 0};
+    const AskedLines& of = lines[stretch_];
+    const Piece piece{of.first + 64 * line_, most < of.count - line_ ? most : of.count - line_};
+    line_ += piece.lines;
+    return piece;
   }
 
  private:

@@ -194,7 +194,13 @@ TEST(TaskAsks, EveryLineOnce) {
         for (std::int64_t n = 0; n < l.count; ++n) wanted.push_back(l.first + 64 * n);
       AskForOthers<Scalar> others;
       for (int k = 0; k < chunks; ++k)
-        others.walk(lines.data(), static_cast<std::int32_t>(lines.size()), static_cast<std::int32_t>((all + chunks - 1) / chunks), [&](const char* line) { asked.push_back(line); });
+        for (std::int64_t left = (all + chunks - 1) / chunks; left > 0;) {
+          const auto piece = others.next(lines.data(), static_cast<std::int32_t>(lines.size()), left);
+          ASSERT_LE(piece.lines, left);
+          if (piece.lines == 0) break;
+          left -= piece.lines;
+          for (std::int64_t n = 0; n < piece.lines; ++n) asked.push_back(piece.first + 64 * n);
+        }
       EXPECT_EQ(asked, wanted);
     }
 }
