@@ -9,7 +9,7 @@
 
 #include "bench/parallel_for_step.h"
 #include "bench/step_modes.h"
-#include "core/step_graph.h"
+#include "core/flow_graph.h"
 #include "core/task_order.h"
 
 namespace platen::bench {
@@ -97,7 +97,7 @@ void table_of_schedules(const StepOptions& o) {
       ParallelForStep tasks(*sim, scene.law, scene.gravity, 1);
       const std::vector<ParallelForStep::BatchTimes> times = tasks.times(40);
       TaskTable graph(sim->batches(), 32, false);
-      order_if_large(graph, sim->batches(), ordered_cache, workers);
+      if (order_if_large(graph, sim->batches(), ordered_cache, workers) == 0.0 && workers > 2) deal_out(graph, sim->batches(), workers);
       const double overhead = overhead_of_a_task(graph);
       std::vector<double> cost;
       for (const Task& task : graph.tasks()) {

@@ -164,54 +164,20 @@ bool lies_ahead(std::int32_t i, std::int32_t j, std::int32_t all) {
 
 }  // namespace
 
-int automatic_batch(std::int32_t particles, int threads, bool even) {
-  // Fewer and larger batches have fewer pairs across and cost the graph less. Where work lies unevenly, and on more
-  // than two threads, where one for each was never measured, about three to eight for each thread even the load out, eight from 2,048
-  // spheres each on, where a task is long against what the graph takes for it. None has more than 20,000: larger ones were
-  // no faster. Beds that no cache holds are run batch by batch in an order of their own, which needs small ones
-  // [core/task_order.h, docs/decisions.md].
-  threads = std::max(1, threads);
-  const int largest = particles > particles_in_cache ? 2048 : 20000, each = std::max(1, (particles + threads * largest - 1) / (threads * largest));
-  const int several = std::clamp(particles / 2048, 3 * threads, 8 * threads);
-  const int count = threads == 1 || (threads == 2 && even) ? threads * each : std::max(threads * each, several);
-  const int size = (particles + count - 1) / count;  // rounded up, or a last batch of a few spheres is left over
-  return std::max(256, (size + padding - 1) / padding * padding);
-}
-
-bool work_is_even(const std::vector<Batch>& batches, int parts) {
-  std::int64_t spheres = 0, work = 0;
-  for (const Batch& b : batches) spheres += b.count, work += b.count + b.used;  // a pair costs about as much as a sphere
-  if (parts < 1 || spheres < parts) return false;
-  // Work of equal stretches of the curve, spread evenly within each batch.
-  double of_part = 0.0, most = 0.0;
-  std::int64_t at = 0, part = 1;
-  for (const Batch& b : batches) {
-    for (std::int64_t left = b.count; left > 0;) {
-      const std::int64_t end = spheres * part / parts, taken = std::min(left, end - at);
-      of_part += static_cast<double>(taken) * (1.0 + static_cast<double>(b.used) / static_cast<double>(b.count));
-      left -= taken, at += taken;
-      if (at == end) most = std::max(most, of_part), of_part = 0.0, ++part;
-    }
-  }
-  return most < 1.05 * static_cast<double>(work) / parts;
-}
-
 int BatchOf::operator()(std::int32_t particle) const {
   return static_cast<int>(std::upper_bound(starts.begin(), starts.end(), particle) - starts.begin()) - 1;
 }
 
-std::vector<Batch> make_batches(const Particles& p, const Domain& domain, const Margins& margins, int size, Ownership ownership,
+std::vector<Batch> make_batches(const Particles& p, const Domain& domain, const Margins& margins, const Cuts& cuts, Ownership ownership,
                                 const KernelTable& kernels, const ParallelFor& parallel) {
-  const int vectors = p.padded / padding;
-  const int count = std::max(1, std::min(vectors, static_cast<int>(std::lround(static_cast<double>(p.padded) / size))));
+  const int count = static_cast<int>(cuts.size()) - 1;
   std::vector<Batch> batches(static_cast<std::size_t>(count));
-  std::vector<std::int32_t> batch_of(static_cast<std::size_t>(std::max(vectors, 1)), 0);  // of each vector of particles
+  std::vector<std::int32_t> batch_of(static_cast<std::size_t>(std::max(p.padded / padding, 1)), 0);  // of each vector of particles
   for (int k = 0; k < count; ++k) {
-    const auto edge = [&](int m) { return static_cast<std::int32_t>(static_cast<std::int64_t>(vectors) * m / count); };
-    Batch& batch = batches[static_cast<std::size_t>(k)];
-    batch.first = edge(k) * padding;
-    batch.count = (edge(k + 1) - edge(k)) * padding;
-    std::fill(batch_of.begin() + edge(k), batch_of.begin() + edge(k + 1), k);
+    const auto at = static_cast<std::size_t>(k);
+    Batch& batch = batches[at];
+    batch.first = cuts[at], batch.count = cuts[at + 1] - cuts[at];
+    std::fill(batch_of.begin() + cuts[at] / padding, batch_of.begin() + cuts[at + 1] / padding, k);
   }
 
   double largest = p.common_radius;

@@ -6,6 +6,7 @@
 #include <functional>
 #include <vector>
 
+#include "core/batch_cuts.h"
 #include "core/batches.h"
 #include "core/margins.h"
 #include "core/parallel_for.h"
@@ -42,20 +43,10 @@ enum class Ownership {
   by_colour  // for fused tasks: of the one of the lower colour, so that within a step no two batches wait for each other [step_graph.cpp]
 };
 
-// Cuts the particles into batches of about `size` and fills their outer lists with every pair closer than
+// Cuts the particles into batches and fills their outer lists with every pair closer than
 // R_i + R_j + both margins. Particles must be in Morton order, rows up to date.
-std::vector<Batch> make_batches(const Particles& particles, const Domain& domain, const Margins& margins, int size, Ownership ownership,
+std::vector<Batch> make_batches(const Particles& particles, const Domain& domain, const Margins& margins, const Cuts& cuts, Ownership ownership,
                                 const KernelTable& kernels, const ParallelFor& parallel);
-
-// About as many particles, with their contacts, as the third cache of common processors holds.
-inline constexpr std::int32_t particles_in_cache = 60000;
-
-// Particles in a batch where nothing else is asked for: enough batches for all threads, none too small to be worth a task.
-// `even`: equal stretches of the Morton curve are equal work; of interest to two threads only.
-int automatic_batch(std::int32_t particles, int threads, bool even);
-
-// Whether `parts` equal stretches of the curve are, to 5 %, equal work. False where nothing is known yet.
-bool work_is_even(const std::vector<Batch>& batches, int parts);
 
 // Batch of a particle.
 struct BatchOf {

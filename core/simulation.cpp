@@ -6,6 +6,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -40,7 +41,7 @@ Simulation::Simulation(SimulationSetup setup)
 
 Simulation::~Simulation() {
   // The graph belongs to the arena that it was built in.
-  graph_.reset();
+  for (auto& graph : graphs_) graph.reset();
 }
 
 void Simulation::setup_particles(const SphereTable& table) {
@@ -424,23 +425,33 @@ void Simulation::run_chunk(int steps) {
   first_motion_.kick = 0.5 * (last_drift_ + dt_);
   const TaskBody body = [this](const Task& task) { run_task(task); };
   switch (engine_.executor) {
-    case Executor::flow_graph: workers_->arena.execute([&] { graph_->run(steps); }); break;
+    case Executor::flow_graph: workers_->arena.execute([&] { run_graph(steps); }); break;
     case Executor::plain_threads: run_on_plain_threads(*table_, steps, body, engine_.threads); break;
     default: run_serially(*table_, steps, body); break;
   }
 }
 
-void Simulation::prepare_graph() {
+void Simulation::prepare_table() {
   if (table_) return;
-  graph_.reset();
   table_ = std::make_unique<TaskTable>(batches_, unroll_, engine_.fused);
-  const bool alone = engine_.threads == 1 || engine_.executor == Executor::serial;
-  const double cache = order_if_large(*table_, batches_, engine_.cache, engine_.executor == Executor::flow_graph ? engine_.threads : 1, on_workers());
+  const bool in_graph = engine_.executor == Executor::flow_graph, alone = engine_.threads == 1 || engine_.executor == Executor::serial;
+  const double cache = order_if_large(*table_, batches_, engine_.cache, in_graph ? engine_.threads : 1, on_workers());
   // A worker asks for what it will itself take next; where anybody may take a task nobody knows who that is.
   if (cache > 0.0 && (alone || !table_->worker().empty())) asks_ = asks_of_tasks(*table_, batches_, asked_beyond * cache);
+  takers_are_tried_ = cache == 0.0 && in_graph && engine_.threads > 2;
+  if (takers_are_tried_) deal_out(*table_, batches_, engine_.threads);
   if (engine_.tamper) engine_.tamper(*table_);
-  if (engine_.executor == Executor::flow_graph)
-    workers_->arena.execute([&] { graph_ = std::make_unique<FlowGraph>(*table_, [this](const Task& task) { run_task(task); }); });
+}
+
+// A bed in the caches: threads that keep their part of it are the fastest where each has a core to itself, and the slowest where something
+// else holds one of them up.
+void Simulation::run_graph(int steps) {
+  const Takers takers = table_->worker().empty() || (takers_are_tried_ && quicker_.way() == 1) ? Takers::anybody : Takers::workers;
+  std::unique_ptr<FlowGraph>& graph = graphs_[static_cast<std::size_t>(takers)];
+  if (!graph) graph = std::make_unique<FlowGraph>(*table_, [this](const Task& task) { run_task(task); }, takers);
+  const auto start = std::chrono::steady_clock::now();
+  graph->run(steps);
+  if (takers_are_tried_ && 2 * steps >= unroll_) quicker_.took(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / steps);
 }
 
 void Simulation::advance(std::int64_t steps) {

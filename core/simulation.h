@@ -16,10 +16,12 @@
 #include "core/batches.h"
 #include "core/contacts.h"
 #include "core/fixed_sum.h"
+#include "core/flow_graph.h"
 #include "core/measures.h"
 #include "core/neighbours.h"
 #include "core/particles.h"
 #include "core/plates.h"
+#include "core/quicker.h"
 #include "core/stability.h"
 #include "core/step_graph.h"
 #include "core/task_asks.h"
@@ -169,7 +171,7 @@ class Simulation {
   void rebuild();
   void rebuild_with(const PairHistories& pairs);
   int batch_size(bool even) const;
-  void cut_into_batches(const PairHistories& pairs, const std::int32_t* bucket, int size);
+  void cut_into_batches(const PairHistories& pairs, const std::int32_t* bucket, const Cuts& cuts);
   void rebuild_from(const PairHistories& pairs, const std::vector<PlateHistory>& plates, const AlignedArray<double>* sums);
   void take_sides_away();
   void prune_lists();
@@ -203,7 +205,8 @@ class Simulation {
     return [this](int count, const std::function<void(int)>& body) { parallel(count, body); };
   }
   [[noreturn]] void fail(const std::string& what);
-  void prepare_graph();
+  void prepare_table();
+  void run_graph(int steps);
   void add_pair_energy(FixedSum& sum) const;
 
   PairLaw pair_;
@@ -257,7 +260,9 @@ class Simulation {
   int steps_of_run_ = 0;
   TaskAsks asks_;  // of the table's tasks; empty where none asks
   std::unique_ptr<TaskTable> table_;
-  std::unique_ptr<FlowGraph> graph_;
+  std::unique_ptr<FlowGraph> graphs_[2];  // by Takers; made when needed
+  bool takers_are_tried_ = false;         // there is a choice
+  Quicker quicker_;
   struct Workers;
   std::unique_ptr<Workers> workers_;
   std::unique_ptr<Saved> saved_;

@@ -229,19 +229,34 @@ int Simulation::look(int wanted) {
 Simulation::Ways Simulation::look_back(int steps) {
   const auto n = static_cast<std::size_t>(particles_.count);
   const double factor = steps * dt_ * dt_;
+  struct Found {
+    std::size_t within = 0;
+    double sum = 0.0;  // a number only if all are
+    // Spins of spheres that touch nobody are in no sum. Eight at a time, for vectors.
+    double odd[8] = {};  // stay 0 while all are numbers
+  };
+  std::vector<Found> found(static_cast<std::size_t>(stretches_of(n)));
+  parallel(stretches_of(n), [&](int part) {
+    const Particles& p = particles_;
+    const IndexRange range = stretch(n, part);
+    Found now;
+    for (std::size_t k = range.first; k < range.last; ++k) {
+      now.within += factor * speed2_[k] <= room_[k] * room_[k] ? 1u : 0u;
+      now.sum += speed2_[k];
+    }
+    std::size_t k = range.first;
+    for (; k + 8 <= range.last; k += 8)
+      for (std::size_t lane = 0; lane < 8; ++lane) now.odd[lane] += 0.0 * (p.ux[k + lane] + p.uy[k + lane] + p.uz[k + lane]);
+    for (; k < range.last; ++k) now.odd[0] += 0.0 * (p.ux[k] + p.uy[k] + p.uz[k]);
+    found[static_cast<std::size_t>(part)] = now;
+  });
   std::size_t within = 0;
-  double sum = 0.0;  // a number only if all are
-  for (std::size_t k = 0; k < n; ++k) {
-    within += factor * speed2_[k] <= room_[k] * room_[k] ? 1u : 0u;
-    sum += speed2_[k];
+  for (const Found& part : found) {
+    if (!(part.sum < 0x1p60)) return Ways::no_number;  // also a velocity that is a number, but an absurd one
+    for (const double x : part.odd)
+      if (!(x == 0.0)) return Ways::no_number;
+    within += part.within;
   }
-  if (!(sum < 0x1p60)) return Ways::no_number;  // also a velocity that is a number, but an absurd one
-  // Spins of spheres that touch nobody are in no sum. Eight at a time, for vectors; places that fill up the last one rest.
-  double odd[8] = {};  // stay 0 while all are numbers
-  for (std::size_t k = 0; k < static_cast<std::size_t>(particles_.padded); k += 8)
-    for (std::size_t lane = 0; lane < 8; ++lane) odd[lane] += 0.0 * (particles_.ux[k + lane] + particles_.uy[k + lane] + particles_.uz[k + lane]);
-  for (const double x : odd)
-    if (!(x == 0.0)) return Ways::no_number;
   if (within == n) return Ways::within_margins;
   std::vector<char> beyond(n);
   for (std::size_t k = 0; k < n; ++k) beyond[k] = !(factor * speed2_[k] <= room_[k] * room_[k]);
@@ -337,11 +352,11 @@ int Simulation::batch_size(bool even) const {
   return std::min(engine_.batch > 0 ? engine_.batch : automatic_batch(particles_.count, engine_.threads, even), 1 << 21);
 }
 
-void Simulation::cut_into_batches(const PairHistories& pairs, const std::int32_t* bucket, int size) {
+void Simulation::cut_into_batches(const PairHistories& pairs, const std::int32_t* bucket, const Cuts& cuts) {
   const ParallelFor run = on_workers();
   batches_.clear();  // before the new ones are made: their memory serves again
   const Ownership ownership = engine_.fused ? Ownership::by_colour : Ownership::ahead;
-  batches_ = make_batches(particles_, domain_, outer_, size, ownership, kernels_, run);
+  batches_ = make_batches(particles_, domain_, outer_, cuts, ownership, kernels_, run);
   fill_inner(batches_, particles_, domain_, inner_, keeps_k_t(), pairs, bucket, run);
   const double bytes = touched_bytes(batches_);
   asks_ahead_ = bytes > 0.5 * engine_.cache * engine_.threads;
@@ -351,24 +366,28 @@ void Simulation::cut_into_batches(const PairHistories& pairs, const std::int32_t
 // `sums`: forces by rank; null where there are none yet.
 void Simulation::rebuild_from(const PairHistories& pairs, const std::vector<PlateHistory>& plates, const AlignedArray<double>* sums) {
   const ParallelFor run = on_workers();
+  // Several threads share the work of a bed in the cache; the batches of a larger one go where there is room [core/task_order.h].
+  const bool shared = engine_.threads > 1 && particles_.count <= particles_in_cache;
   // Fused, two batches would take turns.
   const bool even = engine_.threads == 2 && !engine_.fused && (batches_.empty() || work_is_even(batches_, engine_.threads));
+  const Cuts cuts = shared && !batches_.empty() ? cuts_of_equal_work(batches_, particles_.padded, batch_size(even)) : equal_cuts(particles_.padded, batch_size(even));
+  const bool unknown = shared && (even || batches_.empty());
   const std::vector<std::int32_t> order = morton_order(particles_, 0, run);
   particles_.permute(order, run);
   const std::int32_t* const bucket = pairs.by_place ? order.data() : particles_.rank.data();
   choose_margins(true);
-  graph_.reset();
+  for (auto& graph : graphs_) graph.reset();
   table_.reset();
   asks_.clear();
-  cut_into_batches(pairs, bucket, batch_size(even));
+  cut_into_batches(pairs, bucket, cuts);
   // Nobody knew at first, and of two batches one may have the border to itself.
-  if (even && batch_size(false) != batch_size(true) && !work_is_even(batches_, engine_.threads)) cut_into_batches(pairs, bucket, batch_size(false));
+  if (unknown && !work_is_even(batches_, engine_.threads)) cut_into_batches(pairs, bucket, cuts_of_equal_work(batches_, particles_.padded, batch_size(false)));
   list_plates(batches_, particles_, planes_, step_, inner_, plate_gap_, plates, run);
   merged_.assign(batches_.size(), 1);
   if (sums != nullptr) put_sums(*sums);
   // The graph is as long as a usual run between two looks.
   unroll_ = engine_.unroll;
-  prepare_graph();
+  prepare_table();
   remember(at_rebuild_, drift_at_rebuild_);
   remember(at_prune_, drift_at_prune_);
   plane_moved_ = 0.0;

@@ -1,7 +1,5 @@
 #include "core/step_graph.h"
 
-#include <tbb/flow_graph.h>
-
 #include <algorithm>
 #include <stdexcept>
 #include <thread>
@@ -112,15 +110,24 @@ void TaskTable::reorder(const TaskOrder& order) {
     for (std::int32_t& next : successors.back()) next = place[static_cast<std::size_t>(next)];
   }
   tasks_ = std::move(tasks), successors_ = std::move(successors), predecessors_ = std::move(predecessors);
-  ordered_ = true, worker_ = order.worker;
-  next_of_worker_.assign(order.worker.size(), -1);
+  ordered_ = true;
+  give_to(order.worker);
+}
+
+void TaskTable::give_to(std::vector<std::int32_t> workers) {
+  worker_ = std::move(workers);
+  next_of_worker_.assign(worker_.size(), -1);
   std::vector<std::int32_t> next;  // of each worker, from the end on
-  for (std::size_t k = order.worker.size(); k-- > 0;) {
-    const auto worker = static_cast<std::size_t>(order.worker[k]);
+  for (std::size_t k = worker_.size(); k-- > 0;) {
+    const auto worker = static_cast<std::size_t>(worker_[k]);
     if (worker >= next.size()) next.resize(worker + 1, -1);
     next_of_worker_[k] = next[worker];
     next[worker] = static_cast<std::int32_t>(k);
   }
+}
+
+int worker_count(const TaskTable& table) {
+  return table.worker().empty() ? 0 : *std::max_element(table.worker().begin(), table.worker().end()) + 1;
 }
 
 std::vector<int> worker_of_batches(const TaskTable& table, std::size_t batches) {
@@ -175,62 +182,6 @@ void run_on_plain_threads(const TaskTable& table, int steps, const TaskBody& bod
     });
   }
   for (std::thread& thread : team) thread.join();
-}
-
-struct FlowGraph::Graph {
-  using Node = tbb::flow::continue_node<tbb::flow::continue_msg>;
-  tbb::flow::graph graph;
-  std::vector<std::unique_ptr<Node>> nodes;
-  std::vector<Node*> roots;
-  TaskBody body;
-  int steps = 0;
-};
-
-namespace {
-
-// The next task of the same batch, which always waits for this one; -1 at the end.
-std::int32_t next_of_batch(const TaskTable& table, std::size_t t) {
-  for (const std::int32_t next : table.successors()[t])
-    if (table.tasks()[static_cast<std::size_t>(next)].batch == table.tasks()[t].batch) return next;
-  return -1;
-}
-
-}  // namespace
-
-FlowGraph::FlowGraph(const TaskTable& table, TaskBody body) : graph_(std::make_unique<Graph>()) {
-  Graph& g = *graph_;
-  const bool by_worker = !table.next_of_worker().empty();
-  g.body = std::move(body);
-  g.nodes.reserve(table.tasks().size());
-  for (const Task& task : table.tasks()) {
-    const auto priority = static_cast<tbb::flow::node_priority_t>(table.tasks().size() - g.nodes.size());
-    g.nodes.push_back(std::make_unique<Graph::Node>(g.graph, [graph = graph_.get(), task](const tbb::flow::continue_msg&) {
-      if (task.offset < graph->steps) graph->body(task);
-      return tbb::flow::continue_msg();
-    }, table.ordered() && !by_worker ? priority : tbb::flow::no_priority));
-  }
-  std::vector<bool> waits(table.tasks().size());
-  for (std::size_t t = 0; t < table.tasks().size(); ++t) waits[t] = table.predecessors()[t] > 0;
-  for (std::size_t t = 0; t < table.tasks().size(); ++t) {
-    const auto edge = [&](std::int32_t next) { tbb::flow::make_edge(*g.nodes[t], *g.nodes[static_cast<std::size_t>(next)]); };
-    // The last edge is that of the task to go on with, if it is ready: a thread keeps it, and leaves what else it sets free to be taken. Where
-    // tasks have workers it is the worker's next one, which waits for this one even if it needs nothing from it; elsewhere the same batch's,
-    // whose arrays its caches hold. Otherwise two threads may change batches at every task.
-    const std::int32_t own = by_worker ? table.next_of_worker()[t] : next_of_batch(table, t);
-    for (const std::int32_t next : table.successors()[t])
-      if (next != own) edge(next);
-    if (own >= 0) edge(own), waits[static_cast<std::size_t>(own)] = true;
-  }
-  for (std::size_t t = 0; t < waits.size(); ++t)
-    if (!waits[t]) g.roots.push_back(g.nodes[t].get());
-}
-
-FlowGraph::~FlowGraph() = default;
-
-void FlowGraph::run(int steps) {
-  graph_->steps = steps;
-  for (Graph::Node* root : graph_->roots) root->try_put(tbb::flow::continue_msg());
-  graph_->graph.wait_for_all();
 }
 
 }  // namespace platen

@@ -3,14 +3,13 @@
 // The table is written down once in the order of the steps. Two tasks that touch the same resource,
 // at least one of them writing, keep that order: edges are derived, nobody writes them. It may be put into another order that keeps all edges; then one
 // thread takes the tasks as they come, more take the first that is ready, or each the next of its own. The same table runs serially,
-// as an oneTBB flow graph, or on plain threads that wait on their predecessors' flags (for ThreadSanitizer, which cannot
+// as an oneTBB flow graph [core/flow_graph.h], or on plain threads that wait on their predecessors' flags (for ThreadSanitizer, which cannot
 // see through an uninstrumented libtbb).
 #pragma once
 
 #include <atomic>
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -58,6 +57,7 @@ class TaskTable {
   // Whether the order of the tasks is meant [core/task_order.h]; otherwise a graph takes whichever is ready.
   bool ordered() const { return ordered_; }
   void reorder(const TaskOrder& order);  // must keep all edges
+  void give_to(std::vector<std::int32_t> workers);  // of each task; a worker takes its own in the table's order
   // Of each task, who takes it and which one that worker takes next, or -1; empty where any worker may take any task.
   const std::vector<std::int32_t>& worker() const { return worker_; }
   const std::vector<std::int32_t>& next_of_worker() const { return next_of_worker_; }
@@ -74,6 +74,8 @@ class TaskTable {
   std::vector<std::int32_t> predecessors_, worker_, next_of_worker_;
 };
 
+// How many workers the tasks have; 0 where any worker may take any task.
+int worker_count(const TaskTable& table);
 // Who has each of so many batches; all are of worker 0 where any worker may take any task.
 std::vector<int> worker_of_batches(const TaskTable& table, std::size_t batches);
 
@@ -82,17 +84,5 @@ using TaskBody = std::function<void(const Task&)>;
 // Runs the tasks of the first `steps` steps of the table.
 void run_serially(const TaskTable& table, int steps, const TaskBody& body);
 void run_on_plain_threads(const TaskTable& table, int steps, const TaskBody& body, int threads);
-
-// An oneTBB flow graph of the table, built once and run many times. Build and run it inside the arena that shall work.
-class FlowGraph {
- public:
-  FlowGraph(const TaskTable& table, TaskBody body);
-  ~FlowGraph();
-  void run(int steps);
-
- private:
-  struct Graph;
-  std::unique_ptr<Graph> graph_;
-};
 
 }  // namespace platen

@@ -7,6 +7,8 @@
 #include <queue>
 #include <tuple>
 
+#include "core/batch_cuts.h"
+
 namespace platen {
 
 namespace {
@@ -174,6 +176,19 @@ double order_if_large(TaskTable& table, const std::vector<Batch>& batches, doubl
   const double own = parts ? std::min(bytes, bytes * 8.0 / (3.0 * std::min(workers, 8))) : bytes;
   table.reorder(order_for_cache(table, batches, own, parts ? workers : 1, parallel));
   return own;
+}
+
+void deal_out(TaskTable& table, const std::vector<Batch>& batches, int workers) {
+  double all = 0.0, before = 0.0;
+  for (const Batch& b : batches) all += static_cast<double>(work_of(b));
+  std::vector<std::int32_t> of_batch, of_task;
+  for (const Batch& b : batches) {
+    const auto own = static_cast<double>(work_of(b));
+    of_batch.push_back(std::min(workers - 1, static_cast<std::int32_t>(workers * (before + 0.5 * own) / std::max(all, 1.0))));
+    before += own;
+  }
+  for (const Task& task : table.tasks()) of_task.push_back(of_batch[static_cast<std::size_t>(task.batch)]);
+  table.give_to(std::move(of_task));
 }
 
 }  // namespace platen

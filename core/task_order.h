@@ -45,4 +45,7 @@ TaskOrder order_for_cache(const TaskTable& table, const std::vector<Batch>& batc
 // a part of their own take what comes next; of more than two each counts on less than `bytes`. What each counts on; 0 where the table is left as it is.
 double order_if_large(TaskTable& table, const std::vector<Batch>& batches, double bytes, int workers, const ParallelFor& parallel = in_turn);
 
+// Gives each worker a stretch of the curve, of about the same work, in the order of the table: for beds in the caches.
+void deal_out(TaskTable& table, const std::vector<Batch>& batches, int workers);
+
 }  // namespace platen

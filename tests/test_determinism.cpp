@@ -125,6 +125,20 @@ TEST(Determinism, AutomaticBatches) {
   }
 }
 
+// Both ways to share a bed in the caches, one after the other [core/quicker.h].
+TEST(Determinism, WhoeverTakesTheTasks) {
+  for (const int threads : {3, 8})
+    for (const bool fused : {false, true}) {
+      EngineOptions engine;
+      engine.threads = threads, engine.fused = fused, engine.batch = 32, engine.unroll = 4;
+      bool parts = false;
+      engine.tamper = [&](TaskTable& table) { parts = !table.worker().empty() && !table.ordered(); };
+      static_assert(bed_steps > 4 * Quicker::runs_of_block * Quicker::blocks_of_trial);
+      expect_same(run(pressed_bed(engine), bed_steps), reference(), std::to_string(threads) + (fused ? " fused" : " split"));
+      EXPECT_TRUE(parts);
+    }
+}
+
 TEST(Determinism, SkinsAndGaps) {
   const double R = 0.0025;
   for (const double skin : {0.1 * R, 0.3 * R, 0.7 * R})

@@ -292,66 +292,6 @@ TEST(Batches, ShareWhatLiesBetweenThem) {
 }
 
 // Batches of `spheres` each with the given numbers of pairs.
-std::vector<Batch> batches_with(std::int32_t spheres, std::initializer_list<std::int32_t> pairs) {
-  std::vector<Batch> batches;
-  for (const std::int32_t used : pairs) {
-    Batch& b = batches.emplace_back();
-    b.first = spheres * static_cast<std::int32_t>(batches.size() - 1), b.count = spheres, b.used = used;
-  }
-  return batches;
-}
-
-TEST(AutomaticBatch, OneForEachThreadWhereWorkIsEven) {
-  EXPECT_EQ(automatic_batch(5000, 1, false), 5000);
-  EXPECT_EQ(automatic_batch(5000, 2, true), 2504);   // whole vectors, and no third batch of a few spheres
-  EXPECT_EQ(automatic_batch(17213, 2, true), 8608);
-  EXPECT_EQ(automatic_batch(35000, 2, true), 17504);
-  EXPECT_EQ(automatic_batch(100, 1, false), 256);
-  for (const int threads : {0, 1, 2, 3}) EXPECT_EQ(automatic_batch(0, threads, true), 256);
-}
-
-TEST(AutomaticBatch, SeveralForEachThreadWhereItIsNot) {
-  EXPECT_EQ(automatic_batch(5000, 2, false), 840);
-  EXPECT_EQ(automatic_batch(35000, 2, false), 2192);
-  EXPECT_EQ(automatic_batch(35000, 4, true), 2064);
-}
-
-// From the first step on, since a bed at rest may not make its lists anew for long.
-TEST(AutomaticBatch, WhetherWorkIsEvenIsKnownAtOnce) {
-  for (const bool even : {true, false}) {
-    BedOptions bed;
-    bed.nx = 20, bed.ny = 8, bed.nz = 14;
-    SimulationSetup setup = scenes::bed(bed, scenes::full_law(), {});
-    setup.engine.threads = 2;
-    if (!even)  // spheres of one half of the bed lose sight of each other
-      for (std::size_t k = 0; k < setup.spheres.id.size(); ++k)
-        if (setup.spheres.position[3 * k] > 0.5 * setup.width) setup.spheres.position[3 * k + 2] *= 3.0;
-    Simulation sim(std::move(setup));
-    sim.ensure_forces();
-    EXPECT_EQ(sim.counters().batches, even ? 2 : 6);
-    EXPECT_EQ(sim.counters().rebuilds, 1);
-  }
-}
-
-TEST(AutomaticBatch, NoneIsTooLarge) {
-  for (const int threads : {1, 2, 4, 16})
-    for (const std::int32_t particles : {35'000, 280'000, 1'000'000, 5'000'000}) {
-      EXPECT_LE(automatic_batch(particles, threads, true), 20000);
-      if (particles <= particles_in_cache) continue;
-      EXPECT_LE(automatic_batch(particles, threads, true), 2048);
-    }
-}
-
-TEST(AutomaticBatch, EvenWork) {
-  EXPECT_FALSE(work_is_even({}, 2));
-  EXPECT_FALSE(work_is_even(batches_with(1000, {3000}), 0));
-  EXPECT_TRUE(work_is_even(batches_with(1000, {3000, 3000, 3000}), 2));  // the middle batch counts half for each part
-  EXPECT_TRUE(work_is_even(batches_with(1000, {0, 6000, 0}), 2));
-  EXPECT_FALSE(work_is_even(batches_with(1000, {6000, 0, 0}), 2));       // a free top: all pairs at one end
-  EXPECT_FALSE(work_is_even(batches_with(1000, {3000, 3000, 2000, 2000}), 2));
-  EXPECT_TRUE(work_is_even(batches_with(1000, {6000, 0, 0}), 1));
-}
-
 double distance(const Particles& p, std::size_t i, std::size_t j, double width, double depth) {
   const double dx = std::remainder(p.x[i] - p.x[j], width), dy = std::remainder(p.y[i] - p.y[j], depth), dz = p.z[i] - p.z[j];
   return std::sqrt(dx * dx + dy * dy + dz * dz);

@@ -6,7 +6,7 @@
 #include <mutex>
 #include <set>
 
-#include "core/step_graph.h"
+#include "core/flow_graph.h"
 #include "tests/scenes.h"
 
 namespace platen {

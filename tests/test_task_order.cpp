@@ -9,6 +9,7 @@
 #include <mutex>
 #include <tuple>
 
+#include "core/flow_graph.h"
 #include "core/task_order.h"
 #include "tests/scenes.h"
 

@@ -1,0 +1,82 @@
+#include "core/batch_cuts.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace platen {
+
+namespace {
+
+std::int64_t work_of(const std::vector<Batch>& batches) {
+  std::int64_t work = 0;
+  for (const Batch& b : batches) work += work_of(b);
+  return work;
+}
+
+int count_of(std::int32_t padded, int size) {
+  return std::max(1, std::min(padded / padding, static_cast<int>(std::lround(static_cast<double>(padded) / size))));
+}
+
+}  // namespace
+
+int automatic_batch(std::int32_t particles, int threads, bool even) {
+  // Fewer and larger batches have fewer pairs across and cost the graph less. Where work lies unevenly on two threads about three to
+  // eight for each even the load out, eight from 2,048 spheres each on, where a task is long against what the graph takes for it. More
+  // threads have two each, so that what one waits for is done while it does the other, or as many more as have 2,048 spheres, up to
+  // eight. None has more than 20,000: larger ones were no faster. Beds that no cache holds are run batch by batch in an order of their own, which needs small ones
+  // [core/task_order.h, docs/decisions.md].
+  threads = std::max(1, threads);
+  const int largest = particles > particles_in_cache ? 2048 : 20000, each = std::max(1, (particles + threads * largest - 1) / (threads * largest));
+  const int several = threads == 2 ? std::clamp(particles / 2048, 6, 16) : threads * std::clamp(particles / 2048 / threads, 2, 8);
+  const int count = threads == 1 || (threads == 2 && even) ? threads * each : std::max(threads * each, several);
+  const int size = (particles + count - 1) / count;  // rounded up, or a last batch of a few spheres is left over
+  return std::max(256, (size + padding - 1) / padding * padding);
+}
+
+bool work_is_even(const std::vector<Batch>& batches, int parts) {
+  std::int64_t spheres = 0, work = 0;
+  for (const Batch& b : batches) spheres += b.count, work += work_of(b);
+  if (parts < 1 || spheres < parts) return false;
+  // Work of equal stretches of the curve, spread evenly within each batch.
+  double of_part = 0.0, most = 0.0;
+  std::int64_t at = 0, part = 1;
+  for (const Batch& b : batches) {
+    for (std::int64_t left = b.count; left > 0;) {
+      const std::int64_t end = spheres * part / parts, taken = std::min(left, end - at);
+      of_part += static_cast<double>(taken) * (1.0 + static_cast<double>(b.used) / static_cast<double>(b.count));
+      left -= taken, at += taken;
+      if (at == end) most = std::max(most, of_part), of_part = 0.0, ++part;
+    }
+  }
+  return most < 1.05 * static_cast<double>(work) / parts;
+}
+
+Cuts equal_cuts(std::int32_t padded, int size) {
+  const int count = count_of(padded, size);
+  const std::int64_t vectors = padded / padding;
+  Cuts cuts;
+  for (int k = 0; k <= count; ++k) cuts.push_back(static_cast<std::int32_t>(vectors * k / count) * padding);
+  return cuts;
+}
+
+Cuts cuts_of_equal_work(const std::vector<Batch>& batches, std::int32_t padded, int size) {
+  const int count = count_of(padded, size);
+  const double all = static_cast<double>(work_of(batches));
+  Cuts cuts = {0};
+  std::size_t at = 0;
+  double before = 0.0;  // work of the batches before that one
+  for (int k = 1; k < count; ++k) {
+    const double wanted = all * k / count;
+    for (; at + 1 < batches.size() && before + static_cast<double>(work_of(batches[at])) < wanted; ++at) before += static_cast<double>(work_of(batches[at]));
+    // Within a batch work is taken to lie evenly.
+    const Batch& b = batches[at];
+    const double share = (wanted - before) / static_cast<double>(std::max<std::int64_t>(work_of(b), 1));
+    const auto place = padding * std::lround((b.first + share * b.count) / padding);
+    // None is empty.
+    cuts.push_back(static_cast<std::int32_t>(std::clamp<std::int64_t>(place, cuts.back() + padding, padded - std::int64_t{count - k} * padding)));
+  }
+  cuts.push_back(padded);
+  return cuts;
+}
+
+}  // namespace platen

@@ -1,0 +1,51 @@
+// The quicker of two ways [core/quicker.h].
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "core/quicker.h"
+
+namespace platen {
+namespace {
+
+constexpr int trial = Quicker::runs_of_block * Quicker::blocks_of_trial;
+
+TEST(Quicker, TriesBothInTurnAndTakesTheQuicker) {
+  for (const int best : {0, 1}) {
+    Quicker quicker;
+    std::vector<int> ways;
+    for (int run = 0; run < trial; ++run) {
+      EXPECT_TRUE(quicker.trying());
+      ways.push_back(quicker.way());
+      quicker.took(quicker.way() == best ? 1.0 : 1.2);
+    }
+    for (int run = 0; run < trial; ++run) EXPECT_EQ(ways[static_cast<std::size_t>(run)], run / Quicker::runs_of_block % 2);
+    EXPECT_FALSE(quicker.trying());
+    EXPECT_EQ(quicker.way(), best);
+  }
+}
+
+// The first run of a block, and one that something else held up, decide nothing.
+TEST(Quicker, SingleRunsDecideNothing) {
+  Quicker quicker;
+  for (int run = 0; run < trial; ++run) {
+    const bool first = run % Quicker::runs_of_block == 0, held_up = run == 8;
+    quicker.took(quicker.way() == 1 ? (first || held_up ? 100.0 : 1.0) : 1.1);
+  }
+  EXPECT_EQ(quicker.way(), 1);
+}
+
+TEST(Quicker, StaysAndLooksAgain) {
+  Quicker quicker;
+  for (int run = 0; run < trial; ++run) quicker.took(quicker.way() == 1 ? 1.0 : 2.0);
+  for (int run = 0; run < Quicker::runs_between; ++run) {
+    EXPECT_EQ(quicker.way(), 1);
+    quicker.took(50.0);
+  }
+  EXPECT_TRUE(quicker.trying());
+  for (int run = 0; run < trial; ++run) quicker.took(quicker.way() == 1 ? 2.0 : 1.0);
+  EXPECT_EQ(quicker.way(), 0);
+}
+
+}  // namespace
+}  // namespace platen
