@@ -90,7 +90,7 @@ void table_of_schedules(const StepOptions& o) {
     for (const int workers : either(o.threads, {1, 2, 4, 8, 16, 32, 64})) {
       const InstructionSet set = sets_of(o).front();
       BenchEngine engine = engine_of(o, set, 1);
-      if (engine.batch == 0) engine.batch = automatic_batch(static_cast<std::int32_t>(particles), workers, workers == 2);
+      if (engine.batch == 0) engine.batch = static_cast<int>(particles) / automatic_batches(static_cast<std::int32_t>(particles), workers, workers == 2);
       const auto sim = make_simulation(bed, scene, engine);
       sim->advance(64);
       sim->rebuild_now();

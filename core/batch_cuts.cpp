@@ -13,25 +13,28 @@ std::int64_t work_of(const std::vector<Batch>& batches) {
   return work;
 }
 
-int count_of(std::int32_t padded, int size) {
-  return std::max(1, std::min(padded / padding, static_cast<int>(std::lround(static_cast<double>(padded) / size))));
-}
+int possible(std::int32_t padded, int count) { return std::clamp(count, 1, std::max(padded / padding, 1)); }
 
 }  // namespace
 
-int automatic_batch(std::int32_t particles, int threads, bool even) {
+int automatic_batches(std::int32_t particles, int threads, bool even) {
   // Fewer and larger batches have fewer pairs across and cost the graph less. Where work lies unevenly on two threads about three to
   // eight for each even the load out, eight from 2,048 spheres each on, where a task is long against what the graph takes for it. More
   // threads have two each, so that what one waits for is done while it does the other, or as many more as have 2,048 spheres, up to
-  // eight. None has more than 20,000: larger ones were no faster. Beds that no cache holds are run batch by batch in an order of their own, which needs small ones
-  // [core/task_order.h, docs/decisions.md].
+  // eight; one where two would be small. None has more than 20,000: larger ones were no faster. Beds that no cache holds are run batch
+  // by batch in an order of their own, which needs small ones [core/task_order.h, docs/decisions.md].
   threads = std::max(1, threads);
+  constexpr int least = 256;
   const int largest = particles > particles_in_cache ? 2048 : 20000, each = std::max(1, (particles + threads * largest - 1) / (threads * largest));
-  const int several = threads == 2 ? std::clamp(particles / 2048, 6, 16) : threads * std::clamp(particles / 2048 / threads, 2, 8);
-  const int count = threads == 1 || (threads == 2 && even) ? threads * each : std::max(threads * each, several);
-  const int size = (particles + count - 1) / count;  // rounded up, or a last batch of a few spheres is left over
-  return std::max(256, (size + padding - 1) / padding * padding);
+  int count = threads * each;
+  if (threads > 2)
+    count = threads * std::max(each, particles < 2 * least * threads ? 1 : std::clamp(particles / 2048 / threads, 2, 8));
+  else if (threads == 2 && !even)
+    count = std::max(count, std::clamp(particles / 2048, 6, 16));
+  return std::clamp(count, 1, std::max(1, particles / least));
 }
+
+int batches_of(std::int32_t padded, int size) { return static_cast<int>(std::lround(static_cast<double>(padded) / size)); }
 
 bool work_is_even(const std::vector<Batch>& batches, int parts) {
   std::int64_t spheres = 0, work = 0;
@@ -51,16 +54,16 @@ bool work_is_even(const std::vector<Batch>& batches, int parts) {
   return most < 1.05 * static_cast<double>(work) / parts;
 }
 
-Cuts equal_cuts(std::int32_t padded, int size) {
-  const int count = count_of(padded, size);
+Cuts equal_cuts(std::int32_t padded, int count) {
+  count = possible(padded, count);
   const std::int64_t vectors = padded / padding;
   Cuts cuts;
   for (int k = 0; k <= count; ++k) cuts.push_back(static_cast<std::int32_t>(vectors * k / count) * padding);
   return cuts;
 }
 
-Cuts cuts_of_equal_work(const std::vector<Batch>& batches, std::int32_t padded, int size) {
-  const int count = count_of(padded, size);
+Cuts cuts_of_equal_work(const std::vector<Batch>& batches, std::int32_t padded, int count) {
+  count = possible(padded, count);
   const double all = static_cast<double>(work_of(batches));
   Cuts cuts = {0};
   std::size_t at = 0;

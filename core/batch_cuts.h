@@ -11,9 +11,11 @@ namespace platen {
 // About as many particles, with their contacts, as the third cache of common processors holds.
 inline constexpr std::int32_t particles_in_cache = 60000;
 
-// Particles in a batch where nothing else is asked for: enough batches for all threads, none too small to be worth a task.
-// `even`: the work of the bed can be shared out evenly.
-int automatic_batch(std::int32_t particles, int threads, bool even);
+// Batches where nothing else is asked for: enough for all threads, none too small to be worth a task.
+// `even`: equal stretches of the Morton curve are equal work; of interest to two threads only.
+int automatic_batches(std::int32_t particles, int threads, bool even);
+// Batches of about so many particles each.
+int batches_of(std::int32_t padded, int size);
 
 // What a step has to do for a batch, about: a pair costs about as much as a sphere.
 inline std::int64_t work_of(const Batch& b) { return std::int64_t{b.count} + b.used; }
@@ -21,10 +23,10 @@ inline std::int64_t work_of(const Batch& b) { return std::int64_t{b.count} + b.u
 // Whether `parts` equal stretches of the curve are, to 5 %, equal work. False where nothing is known yet.
 bool work_is_even(const std::vector<Batch>& batches, int parts);
 
-// First particle of each batch, and one past the last one of all; whole vectors. As many batches as make them about `size` large.
+// First particle of each batch, and one past the last one of all; whole vectors. Fewer than `count` where there are fewer vectors.
 using Cuts = std::vector<std::int32_t>;
-Cuts equal_cuts(std::int32_t padded, int size);
-// The same number of batches, of equal work as far as these batches of the same particles, cut elsewhere, tell.
-Cuts cuts_of_equal_work(const std::vector<Batch>& batches, std::int32_t padded, int size);
+Cuts equal_cuts(std::int32_t padded, int count);
+// Of equal work, as far as these batches of the same particles, cut elsewhere, tell.
+Cuts cuts_of_equal_work(const std::vector<Batch>& batches, std::int32_t padded, int count);
 
 }  // namespace platen

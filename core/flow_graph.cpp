@@ -1,7 +1,9 @@
 #include "core/flow_graph.h"
 
 #include <tbb/flow_graph.h>
+#include <tbb/global_control.h>
 #include <tbb/info.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <atomic>
@@ -29,17 +31,27 @@ void pause() {
 
 // How long a thread waits for others before it looks for other work. Neighbours that have a core each are about a task behind.
 constexpr auto patience = std::chrono::microseconds(300);
+// After so many waits in vain a worker waits no more in this run: something else may have the core of whom it waits for.
+constexpr int most_in_vain = 4;
 
+// Whether `ready` came true.
 template <class Ready>
-void wait_a_little(const Ready& ready) {
-  if (ready()) return;
+bool wait_a_little(const Ready& ready) {
+  if (ready()) return true;
   const auto start = std::chrono::steady_clock::now();
   do {
     for (int k = 0; k < 32; ++k) {
       pause();
-      if (ready()) return;
+      if (ready()) return true;
     }
   } while (std::chrono::steady_clock::now() - start < patience);
+  return false;
+}
+
+// Threads that may run at once, as far as is known: the arena's, of a process that has been given some cores.
+int most_threads() {
+  return std::min({tbb::info::default_concurrency(), tbb::this_task_arena::max_concurrency(),
+                   static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism))});
 }
 
 // The next task of the same batch, which always waits for this one; -1 at the end.
@@ -56,6 +68,7 @@ struct FlowGraph::Graph {
   using Node = tbb::flow::continue_node<Message>;
   struct alignas(128) Worker {  // on lines of its own
     std::atomic<std::int32_t> done{0};  // tasks of this run
+    int waits_in_vain = 0;              // of this run
   };
 
   tbb::flow::graph graph;
@@ -123,8 +136,8 @@ void FlowGraph::build_for_workers(const TaskTable& table) {
   for (std::size_t t = 0; t < tasks; ++t)
     for (const Need& need : g.needs[t]) g.needed_by[static_cast<std::size_t>(need.task)].push_back(static_cast<std::int32_t>(t));
   g.workers = std::vector<Graph::Worker>(static_cast<std::size_t>(worker_count(table)));
-  // Where there are more workers than cores the one that is waited for may need this very core.
-  const bool waits = worker_count(table) <= tbb::info::default_concurrency();
+  // Where there are more workers than threads the one that is waited for may need this very thread.
+  const bool waits = worker_count(table) <= most_threads();
   for (std::size_t t = 0; t < tasks; ++t) {
     const auto worker = static_cast<std::size_t>(table.worker()[t]);
     g.nodes.push_back(std::make_unique<Graph::Node>(g.graph, static_cast<int>(g.needs[t].size()),
@@ -132,7 +145,7 @@ void FlowGraph::build_for_workers(const TaskTable& table) {
       g.run(task);
       for (const std::int32_t other : g.needed_by[t]) g.nodes[static_cast<std::size_t>(other)]->try_put(Graph::Message());
       own.done.store(own.done.load(std::memory_order_relaxed) + 1, std::memory_order_release);
-      if (next >= 0) wait_a_little([&] { return g.others_are_done(static_cast<std::size_t>(next)); });
+      if (next >= 0 && own.waits_in_vain < most_in_vain && !wait_a_little([&] { return g.others_are_done(static_cast<std::size_t>(next)); })) ++own.waits_in_vain;
       return Graph::Message();
     }));
   }
@@ -150,7 +163,7 @@ FlowGraph::~FlowGraph() = default;
 
 void FlowGraph::run(int steps) {
   graph_->steps = steps;
-  for (Graph::Worker& worker : graph_->workers) worker.done.store(0, std::memory_order_relaxed);
+  for (Graph::Worker& worker : graph_->workers) worker.done.store(0, std::memory_order_relaxed), worker.waits_in_vain = 0;
   for (Graph::Node* root : graph_->roots) root->try_put(Graph::Message());
   graph_->graph.wait_for_all();
 }

@@ -438,20 +438,33 @@ void Simulation::prepare_table() {
   const double cache = order_if_large(*table_, batches_, engine_.cache, in_graph ? engine_.threads : 1, on_workers());
   // A worker asks for what it will itself take next; where anybody may take a task nobody knows who that is.
   if (cache > 0.0 && (alone || !table_->worker().empty())) asks_ = asks_of_tasks(*table_, batches_, asked_beyond * cache);
-  takers_are_tried_ = cache == 0.0 && in_graph && engine_.threads > 2;
+  // Batches of a few spheres, which only a case file asks for, would make long tables of who waits for whom.
+  const auto threads = static_cast<std::size_t>(engine_.threads);
+  takers_are_tried_ = cache == 0.0 && in_graph && threads > 2 && batches_.size() >= threads && batches_.size() <= 64 * threads;
   if (takers_are_tried_) deal_out(*table_, batches_, engine_.threads);
   if (engine_.tamper) engine_.tamper(*table_);
 }
 
-// A bed in the caches: threads that keep their part of it are the fastest where each has a core to itself, and the slowest where something
-// else holds one of them up.
+// Who takes the tasks of the next run. A bed in the caches: threads that keep their part of it are the fastest where each has a core to
+// itself, and the slowest where something else holds one of them up.
+Takers Simulation::takers() const {
+  if (takers_are_tried_) return static_cast<Takers>(quicker_.way());
+  return table_->worker().empty() ? Takers::anybody : Takers::workers;
+}
+
+void Simulation::prepare_graph() {
+  std::unique_ptr<FlowGraph>& graph = graphs_[static_cast<std::size_t>(takers())];
+  if (graph || engine_.executor != Executor::flow_graph) return;
+  workers_->arena.execute([&] { graph = std::make_unique<FlowGraph>(*table_, [this](const Task& task) { run_task(task); }, takers()); });
+}
+
 void Simulation::run_graph(int steps) {
-  const Takers takers = table_->worker().empty() || (takers_are_tried_ && quicker_.way() == 1) ? Takers::anybody : Takers::workers;
-  std::unique_ptr<FlowGraph>& graph = graphs_[static_cast<std::size_t>(takers)];
-  if (!graph) graph = std::make_unique<FlowGraph>(*table_, [this](const Task& task) { run_task(task); }, takers);
+  const Takers by = takers();
   const auto start = std::chrono::steady_clock::now();
-  graph->run(steps);
-  if (takers_are_tried_ && 2 * steps >= unroll_) quicker_.took(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / steps);
+  graphs_[static_cast<std::size_t>(by)]->run(steps);
+  // Of much shorter runs most of the time would be the graph's.
+  if (takers_are_tried_ && 4 * steps >= unroll_) quicker_.took(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / steps);
+  if (by == Takers::workers) ++counters_.runs_by_workers;
 }
 
 void Simulation::advance(std::int64_t steps) {
@@ -461,7 +474,8 @@ void Simulation::advance(std::int64_t steps) {
   std::int64_t at_most = engine_.unroll;
   while (steps > 0) {
     const int n = prepare_lists(std::min<std::int64_t>(steps, one_by_one ? 1 : at_most));
-    save();
+    prepare_graph();
+    save();  // last, so that nothing is lost where memory runs out
     run_chunk(n);
     bool bad = false;
     for (const Batch& b : batches_) bad = bad || b.out_of_range;

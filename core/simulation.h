@@ -79,6 +79,7 @@ struct SimulationState;  // core/simulation_state.h
 struct EngineCounters {
   std::int64_t rebuilds = 0, prunes = 0, redone_steps = 0;
   std::int64_t spared_steps = 0;  // not done again although spheres went beyond their margins
+  std::int64_t runs_by_workers = 0;  // of steps, in which threads kept their parts of the bed [core/flow_graph.h]
   int batches = 0;
   double skin = 0.0, gap = 0.0;  // of the lists, means over the spheres [m]
   std::int64_t bytes = 0;   // of the large arrays
@@ -170,7 +171,7 @@ class Simulation {
   void collect();
   void rebuild();
   void rebuild_with(const PairHistories& pairs);
-  int batch_size(bool even) const;
+  int batch_count(bool even) const;
   void cut_into_batches(const PairHistories& pairs, const std::int32_t* bucket, const Cuts& cuts);
   void rebuild_from(const PairHistories& pairs, const std::vector<PlateHistory>& plates, const AlignedArray<double>* sums);
   void take_sides_away();
@@ -206,6 +207,8 @@ class Simulation {
   }
   [[noreturn]] void fail(const std::string& what);
   void prepare_table();
+  Takers takers() const;
+  void prepare_graph();
   void run_graph(int steps);
   void add_pair_energy(FixedSum& sum) const;
 

@@ -346,10 +346,10 @@ void Simulation::rebuild_with(const PairHistories& pairs) {
   rebuild_from(pairs, plate_history(batches_, particles_), had_forces ? &sums : nullptr);
 }
 
-// Particles in a batch. `even`: equal stretches of the curve are equal work.
-int Simulation::batch_size(bool even) const {
+// `even`: equal stretches of the curve are equal work.
+int Simulation::batch_count(bool even) const {
   // Places of sums are counted in bytes and two more bits [kernels/owner_runs.h]: no batch may have more than some millions.
-  return std::min(engine_.batch > 0 ? engine_.batch : automatic_batch(particles_.count, engine_.threads, even), 1 << 21);
+  return engine_.batch > 0 ? batches_of(particles_.padded, std::min(engine_.batch, 1 << 21)) : automatic_batches(particles_.count, engine_.threads, even);
 }
 
 void Simulation::cut_into_batches(const PairHistories& pairs, const std::int32_t* bucket, const Cuts& cuts) {
@@ -370,7 +370,7 @@ void Simulation::rebuild_from(const PairHistories& pairs, const std::vector<Plat
   const bool shared = engine_.threads > 1 && particles_.count <= particles_in_cache;
   // Fused, two batches would take turns.
   const bool even = engine_.threads == 2 && !engine_.fused && (batches_.empty() || work_is_even(batches_, engine_.threads));
-  const Cuts cuts = shared && !batches_.empty() ? cuts_of_equal_work(batches_, particles_.padded, batch_size(even)) : equal_cuts(particles_.padded, batch_size(even));
+  const Cuts cuts = shared && !batches_.empty() ? cuts_of_equal_work(batches_, particles_.padded, batch_count(even)) : equal_cuts(particles_.padded, batch_count(even));
   const bool unknown = shared && (even || batches_.empty());
   const std::vector<std::int32_t> order = morton_order(particles_, 0, run);
   particles_.permute(order, run);
@@ -381,7 +381,7 @@ void Simulation::rebuild_from(const PairHistories& pairs, const std::vector<Plat
   asks_.clear();
   cut_into_batches(pairs, bucket, cuts);
   // Nobody knew at first, and of two batches one may have the border to itself.
-  if (unknown && !work_is_even(batches_, engine_.threads)) cut_into_batches(pairs, bucket, cuts_of_equal_work(batches_, particles_.padded, batch_size(false)));
+  if (unknown && !work_is_even(batches_, engine_.threads)) cut_into_batches(pairs, bucket, cuts_of_equal_work(batches_, particles_.padded, batch_count(false)));
   list_plates(batches_, particles_, planes_, step_, inner_, plate_gap_, plates, run);
   merged_.assign(batches_.size(), 1);
   if (sums != nullptr) put_sums(*sums);

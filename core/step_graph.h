@@ -58,7 +58,7 @@ class TaskTable {
   bool ordered() const { return ordered_; }
   void reorder(const TaskOrder& order);  // must keep all edges
   void give_to(std::vector<std::int32_t> workers);  // of each task; a worker takes its own in the table's order
-  // Of each task, who takes it and which one that worker takes next, or -1; empty where any worker may take any task.
+  // Of each task, who takes it and which one that worker takes next, or -1; empty where no worker has a part of the bed.
   const std::vector<std::int32_t>& worker() const { return worker_; }
   const std::vector<std::int32_t>& next_of_worker() const { return next_of_worker_; }
   std::vector<Access> accesses(const Task& task) const;

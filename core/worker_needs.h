@@ -1,11 +1,13 @@
 // What tasks that have workers [core/task_order.h] must wait for of the others.
 //
 // A worker takes its tasks one after the other, so of all that a task needs from another worker only the latest counts, and nothing
-// that an earlier task of its own, or what that one waited for, has already waited for:
+// that is known to be done: by what an earlier task of its own waited for, or what that one's worker had waited for, and so on.
 //
-//     worker 0   a0 --- a1 --- a2 --- a3          a3 needs b1 and b2: it waits for b2 alone
-//                                 \               b4 needs a1 and a2: for a2
-//     worker 1   b0 --- b1 --- b2  \  b3 --- b4   b3 needs a1 as well, and b4 comes later: for nothing but its own b3 and a2
+//     worker 0   a0 --- a1 --- a2              b2 needs a0 and a1: it waits for a1 alone.
+//                         \                    b3 needs a1 too: its own b2 has waited for that.
+//     worker 1   b0 --- b1 --- b2 --- b3       c1 needs b2, and a1: only for b2, which came after a1.
+//                                 \
+//     worker 2   c0 -------------- c1
 #pragma once
 
 #include <cstdint>

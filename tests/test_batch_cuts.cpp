@@ -11,6 +11,7 @@ namespace {
 
 using scenes::BedOptions;
 
+// Batches of `spheres` each with the given numbers of pairs.
 std::vector<Batch> batches_with(std::int32_t spheres, std::initializer_list<std::int32_t> pairs) {
   std::vector<Batch> batches;
   for (const std::int32_t used : pairs) {
@@ -20,31 +21,34 @@ std::vector<Batch> batches_with(std::int32_t spheres, std::initializer_list<std:
   return batches;
 }
 
-TEST(AutomaticBatch, OneForEachThreadWhereWorkIsEven) {
-  EXPECT_EQ(automatic_batch(5000, 1, false), 5000);
-  EXPECT_EQ(automatic_batch(5000, 2, true), 2504);   // whole vectors, and no third batch of a few spheres
-  EXPECT_EQ(automatic_batch(17213, 2, true), 8608);
-  EXPECT_EQ(automatic_batch(35000, 2, true), 17504);
-  EXPECT_EQ(automatic_batch(100, 1, false), 256);
-  for (const int threads : {0, 1, 2, 3}) EXPECT_EQ(automatic_batch(0, threads, true), 256);
+TEST(AutomaticBatches, OneForEachThreadWhereWorkIsEven) {
+  EXPECT_EQ(automatic_batches(5000, 1, false), 1);
+  EXPECT_EQ(automatic_batches(17213, 1, true), 1);
+  EXPECT_EQ(automatic_batches(35000, 1, true), 2);  // none has more than 20,000
+  for (const int particles : {5000, 17213, 35000}) EXPECT_EQ(automatic_batches(particles, 2, true), 2);
+  for (const int threads : {1, 2, 16}) EXPECT_EQ(automatic_batches(300, threads, false), 1);
+  for (const int threads : {0, 1, 2, 3}) EXPECT_EQ(automatic_batches(0, threads, true), 1);
 }
 
-TEST(AutomaticBatch, SeveralForEachThreadWhereItIsNot) {
-  EXPECT_EQ(automatic_batch(5000, 2, false), 840);
-  EXPECT_EQ(automatic_batch(35000, 2, false), 2192);
+TEST(AutomaticBatches, SeveralForEachOfTwoThreadsWhereItIsNot) {
+  EXPECT_EQ(automatic_batches(5000, 2, false), 6);
+  EXPECT_EQ(automatic_batches(35000, 2, false), 16);
 }
 
 // What one waits for is done while it does the other.
-TEST(AutomaticBatch, TwoOrMoreForEachOfManyThreads) {
-  EXPECT_EQ(automatic_batch(35000, 4, true), 2192);   // four each
-  EXPECT_EQ(automatic_batch(35000, 16, true), 1096);  // two
-  EXPECT_EQ(automatic_batch(35000, 16, false), 1096);
-  EXPECT_EQ(automatic_batch(5000, 8, true), 320);
-  EXPECT_EQ(automatic_batch(50000, 3, true), 2088);   // eight
+TEST(AutomaticBatches, TwoOrMoreForEachOfManyThreads) {
+  EXPECT_EQ(automatic_batches(35000, 4, true), 16);
+  EXPECT_EQ(automatic_batches(35000, 16, true), 32);
+  EXPECT_EQ(automatic_batches(35000, 16, false), 32);
+  EXPECT_EQ(automatic_batches(5000, 8, true), 16);
+  EXPECT_EQ(automatic_batches(5000, 16, true), 16);  // 312 spheres each; two would be small
+  EXPECT_EQ(automatic_batches(50000, 3, true), 24);
+  EXPECT_EQ(automatic_batches(2000, 16, true), 7);   // fewer than threads
+  for (const int threads : {3, 5, 16, 64}) EXPECT_EQ(automatic_batches(50000, threads, true) % threads, 0);
 }
 
 // From the first step on, since a bed at rest may not make its lists anew for long.
-TEST(AutomaticBatch, WhetherWorkIsEvenIsKnownAtOnce) {
+TEST(AutomaticBatches, WhetherWorkIsEvenIsKnownAtOnce) {
   for (const bool even : {true, false}) {
     BedOptions bed;
     bed.nx = 20, bed.ny = 8, bed.nz = 14;
@@ -60,16 +64,13 @@ TEST(AutomaticBatch, WhetherWorkIsEvenIsKnownAtOnce) {
   }
 }
 
-TEST(AutomaticBatch, NoneIsTooLarge) {
+TEST(AutomaticBatches, NoneIsTooLarge) {
   for (const int threads : {1, 2, 4, 16})
-    for (const std::int32_t particles : {35'000, 280'000, 1'000'000, 5'000'000}) {
-      EXPECT_LE(automatic_batch(particles, threads, true), 20000);
-      if (particles <= particles_in_cache) continue;
-      EXPECT_LE(automatic_batch(particles, threads, true), 2048);
-    }
+    for (const std::int32_t particles : {35'000, 280'000, 1'000'000, 5'000'000})
+      EXPECT_LE(particles / automatic_batches(particles, threads, true), particles > particles_in_cache ? 2048 : 20000);
 }
 
-TEST(AutomaticBatch, EvenWork) {
+TEST(AutomaticBatches, EvenWork) {
   EXPECT_FALSE(work_is_even({}, 2));
   EXPECT_FALSE(work_is_even(batches_with(1000, {3000}), 0));
   EXPECT_TRUE(work_is_even(batches_with(1000, {3000, 3000, 3000}), 2));  // the middle batch counts half for each part
@@ -91,13 +92,14 @@ void expect_whole(const Cuts& cuts, std::int32_t padded, std::size_t batches) {
 
 TEST(Cuts, EqualOnesAreEqual) {
   for (const std::int32_t padded : {8, 1000, 4096})
-    for (const int size : {8, 100, 4096, 100000}) {
-      const Cuts cuts = equal_cuts(padded, size);
-      const auto batches = static_cast<std::size_t>(std::clamp(std::lround(static_cast<double>(padded) / size), 1l, static_cast<long>(padded / padding)));
+    for (const int count : {0, 1, 3, 40, 1000000}) {
+      const Cuts cuts = equal_cuts(padded, count);
+      const auto batches = static_cast<std::size_t>(std::clamp(count, 1, padded / padding));
       expect_whole(cuts, padded, batches);
       for (std::size_t k = 0; k < batches; ++k) EXPECT_NEAR(cuts[k + 1] - cuts[k], static_cast<double>(padded) / static_cast<double>(batches), padding);
     }
-  EXPECT_EQ(equal_cuts(0, 256), (Cuts{0, 0}));
+  EXPECT_EQ(equal_cuts(0, 3), (Cuts{0, 0}));
+  EXPECT_EQ(batches_of(1000, 300), 3);
 }
 
 // Work of a stretch of the curve, as the batches before tell it.
@@ -113,24 +115,24 @@ double work_between(const std::vector<Batch>& batches, double from, double to) {
 TEST(Cuts, OfEqualWork) {
   // The second batch is full of pairs, the last one has none; a vector of particles is at most 8 x 5 = 40 of work.
   const std::vector<Batch> before = batches_with(1000, {1000, 4000, 2000, 0});
-  for (const int size : {2000, 1000, 500, 64}) {
-    const Cuts cuts = cuts_of_equal_work(before, 4000, size);
-    const auto batches = static_cast<std::size_t>(std::lround(4000.0 / size));
+  for (const int count : {2, 4, 8, 63}) {
+    const Cuts cuts = cuts_of_equal_work(before, 4000, count);
+    const auto batches = static_cast<std::size_t>(count);
     expect_whole(cuts, 4000, batches);
     for (std::size_t k = 0; k < batches; ++k)
       EXPECT_NEAR(work_between(before, cuts[k], cuts[k + 1]), 11000.0 / static_cast<double>(batches), 41.0);
   }
-  EXPECT_EQ(cuts_of_equal_work(batches_with(1000, {3000, 3000}), 2000, 1000), equal_cuts(2000, 1000));
+  EXPECT_EQ(cuts_of_equal_work(batches_with(1000, {3000, 3000}), 2000, 5), equal_cuts(2000, 5));
 }
 
 // All work at one end: the others get a vector each all the same.
 TEST(Cuts, NoBatchIsEmpty) {
   const std::vector<Batch> front = batches_with(64, {1000000, 0}), back = batches_with(64, {0, 1000000});
   for (const auto* before : {&front, &back})
-    for (const int size : {64, 16, 8}) expect_whole(cuts_of_equal_work(*before, 128, size), 128, static_cast<std::size_t>(128 / size));
+    for (const int count : {2, 8, 16}) expect_whole(cuts_of_equal_work(*before, 128, count), 128, static_cast<std::size_t>(count));
 }
 
-// Batches of one bed, made anew with several threads: their work is alike, though its lower half alone has pairs.
+// Batches of one bed, made anew with several threads: their work is alike, though only one half of it has pairs.
 TEST(Cuts, ARebuildCutsBySharesOfWork) {
   BedOptions bed;
   bed.nx = 24, bed.ny = 12, bed.nz = 20;

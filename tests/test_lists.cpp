@@ -291,7 +291,6 @@ TEST(Batches, ShareWhatLiesBetweenThem) {
   }
 }
 
-// Batches of `spheres` each with the given numbers of pairs.
 double distance(const Particles& p, std::size_t i, std::size_t j, double width, double depth) {
   const double dx = std::remainder(p.x[i] - p.x[j], width), dy = std::remainder(p.y[i] - p.y[j], depth), dz = p.z[i] - p.z[j];
   return std::sqrt(dx * dx + dy * dy + dz * dz);

@@ -1,7 +1,10 @@
 // What tasks wait for of other workers [core/worker_needs.h].
 #include <gtest/gtest.h>
 
+#include <tbb/task_arena.h>
+
 #include <algorithm>
+#include <mutex>
 #include <random>
 
 #include "core/flow_graph.h"
@@ -106,13 +109,58 @@ TEST(WorkerNeeds, NoneIsTooMany) {
   EXPECT_LT(3 * all, 2 * edges);
 }
 
+// The order of a large bed, whose tasks are not step by step.
+TEST(WorkerNeeds, OfATableInAnotherOrder) {
+  std::mt19937 random(4);
+  Simulation sim = bed(false);
+  sim.ensure_forces();
+  TaskTable table(sim.batches(), 4, false);
+  table.reorder(order_for_cache(table, sim.batches(), touched_bytes(sim.batches()) / 8.0, 3));
+  ASSERT_EQ(worker_count(table), 3);
+  const Needs needs = needs_of_others(table);
+  for (int repetition = 0; repetition < 30; ++repetition)
+    EXPECT_TRUE(keeps_edges(table, run_by(table, needs, [&](const std::vector<std::size_t>& able) { return able[random() % able.size()]; })));
+}
+
+// One graph, run again and again: each task once, in order, and no steps that a run does not have.
+TEST(WorkerNeeds, AGraphOfWorkersRunsManyTimes) {
+  for (const bool fused : {false, true}) {
+    Simulation sim = bed(fused);
+    sim.ensure_forces();
+    for (const int threads : {1, 2, 4}) {
+      const TaskTable table = dealt_out(sim, fused, std::max(2, threads));
+      std::mutex mutex;
+      std::vector<std::int32_t> order;
+      tbb::task_arena arena(threads);
+      arena.execute([&] {
+        FlowGraph graph(table, [&](const Task& task) {
+          const std::lock_guard<std::mutex> lock(mutex);
+          order.push_back(task.number);
+        }, Takers::workers);
+        for (const int steps : {4, 1, 3, 4, 2, 4}) {
+          order.clear();
+          graph.run(steps);
+          std::vector<std::int32_t> place(table.tasks().size(), -1);
+          for (std::size_t k = 0; k < order.size(); ++k) place[static_cast<std::size_t>(order[k])] = static_cast<std::int32_t>(k);
+          for (std::size_t t = 0; t < place.size(); ++t) {
+            EXPECT_EQ(place[t] >= 0, table.tasks()[t].offset < steps);
+            for (const std::int32_t next : table.successors()[t])
+              EXPECT_TRUE(place[static_cast<std::size_t>(next)] < 0 || place[t] < place[static_cast<std::size_t>(next)]);
+          }
+          EXPECT_EQ(order.size() * 4, table.tasks().size() * static_cast<std::size_t>(steps));
+        }
+      });
+    }
+  }
+}
+
 TEST(WorkerNeeds, OneWorkerNeedsNobody) {
   Simulation sim = bed(false);
   sim.ensure_forces();
   for (const auto& of : needs_of_others(dealt_out(sim, false, 1))) EXPECT_TRUE(of.empty());
 }
 
-// Stretches of the curve, of equal work to half a batch, in the order of the table.
+// Stretches of the curve, of equal work to a batch, in the order of the table.
 TEST(WorkerNeeds, WorkIsDealtOutEvenly) {
   Simulation sim = bed(false);
   sim.ensure_forces();
