@@ -388,6 +388,7 @@ void Simulation::rebuild_from(const PairHistories& pairs, const std::vector<Plat
   // The graph is as long as a usual run between two looks.
   unroll_ = engine_.unroll;
   prepare_table();
+  prepare_graph();
   remember(at_rebuild_, drift_at_rebuild_);
   remember(at_prune_, drift_at_prune_);
   plane_moved_ = 0.0;
