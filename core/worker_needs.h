@@ -6,7 +6,7 @@
 //     worker 0   a0 --- a1 --- a2              b2 needs a0 and a1: it waits for a1 alone.
 //                         \                    b3 needs a1 too: its own b2 has waited for that.
 //     worker 1   b0 --- b1 --- b2 --- b3       c1 needs b2, and a1: only for b2, which came after a1.
-//                                 \
+//                                '.
 //     worker 2   c0 -------------- c1
 #pragma once
 
