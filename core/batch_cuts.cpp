@@ -7,12 +7,7 @@ namespace platen {
 
 namespace {
 
-std::int64_t work_of(const std::vector<Batch>& batches) {
-  std::int64_t work = 0;
-  for (const Batch& b : batches) work += work_of(b);
-  return work;
-}
-
+// Batches have a vector at least.
 int possible(std::int32_t padded, int count) { return std::clamp(count, 1, std::max(padded / padding, 1)); }
 
 }  // namespace
@@ -34,11 +29,17 @@ int automatic_batches(std::int32_t particles, int threads, bool even) {
   return std::clamp(count, 1, std::max(1, particles / least));
 }
 
+std::int64_t work_of(const std::vector<Batch>& batches) {
+  std::int64_t work = 0;
+  for (const Batch& b : batches) work += work_of(b);
+  return work;
+}
+
 int batches_of(std::int32_t padded, int size) { return static_cast<int>(std::lround(static_cast<double>(padded) / size)); }
 
 bool work_is_even(const std::vector<Batch>& batches, int parts) {
-  std::int64_t spheres = 0, work = 0;
-  for (const Batch& b : batches) spheres += b.count, work += work_of(b);
+  std::int64_t spheres = 0;
+  for (const Batch& b : batches) spheres += b.count;
   if (parts < 1 || spheres < parts) return false;
   // Work of equal stretches of the curve, spread evenly within each batch.
   double of_part = 0.0, most = 0.0;
@@ -51,7 +52,7 @@ bool work_is_even(const std::vector<Batch>& batches, int parts) {
       if (at == end) most = std::max(most, of_part), of_part = 0.0, ++part;
     }
   }
-  return most < 1.05 * static_cast<double>(work) / parts;
+  return most < 1.05 * static_cast<double>(work_of(batches)) / parts;
 }
 
 Cuts equal_cuts(std::int32_t padded, int count) {

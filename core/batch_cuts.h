@@ -19,6 +19,7 @@ int batches_of(std::int32_t padded, int size);
 
 // What a step has to do for a batch, about: a pair costs about as much as a sphere.
 inline std::int64_t work_of(const Batch& b) { return std::int64_t{b.count} + b.used; }
+std::int64_t work_of(const std::vector<Batch>& batches);
 
 // Whether `parts` equal stretches of the curve are, to 5 %, equal work. False where nothing is known yet.
 bool work_is_even(const std::vector<Batch>& batches, int parts);

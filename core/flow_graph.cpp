@@ -135,9 +135,10 @@ void FlowGraph::build_for_workers(const TaskTable& table) {
   g.needed_by.resize(tasks);
   for (std::size_t t = 0; t < tasks; ++t)
     for (const Need& need : g.needs[t]) g.needed_by[static_cast<std::size_t>(need.task)].push_back(static_cast<std::int32_t>(t));
-  g.workers = std::vector<Graph::Worker>(static_cast<std::size_t>(worker_count(table)));
+  const int workers = worker_count(table);
+  g.workers = std::vector<Graph::Worker>(static_cast<std::size_t>(workers));
   // Where there are more workers than threads the one that is waited for may need this very thread.
-  const bool waits = worker_count(table) <= most_threads();
+  const bool waits = workers <= most_threads();
   for (std::size_t t = 0; t < tasks; ++t) {
     const auto worker = static_cast<std::size_t>(table.worker()[t]);
     g.nodes.push_back(std::make_unique<Graph::Node>(g.graph, static_cast<int>(g.needs[t].size()),

@@ -432,7 +432,6 @@ void Simulation::run_chunk(int steps) {
 }
 
 void Simulation::prepare_table() {
-  if (table_) return;
   table_ = std::make_unique<TaskTable>(batches_, unroll_, engine_.fused);
   const bool in_graph = engine_.executor == Executor::flow_graph, alone = engine_.threads == 1 || engine_.executor == Executor::serial;
   const double cache = order_if_large(*table_, batches_, engine_.cache, in_graph ? engine_.threads : 1, on_workers());

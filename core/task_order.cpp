@@ -179,8 +179,8 @@ double order_if_large(TaskTable& table, const std::vector<Batch>& batches, doubl
 }
 
 void deal_out(TaskTable& table, const std::vector<Batch>& batches, int workers) {
-  double all = 0.0, before = 0.0;
-  for (const Batch& b : batches) all += static_cast<double>(work_of(b));
+  const auto all = static_cast<double>(work_of(batches));
+  double before = 0.0;
   std::vector<std::int32_t> of_batch, of_task;
   for (const Batch& b : batches) {
     const auto own = static_cast<double>(work_of(b));
