@@ -191,7 +191,7 @@ void add_all() {
     benchmark::RegisterBenchmark(fmt::format("plates/{}", to_string(set)).c_str(), plates, set);
     if (const PhasePasses passes = phase_passes(set); passes.full != nullptr)
       for (const auto& [name, pass] : {std::pair{"full", passes.full}, std::pair{"linear", passes.linear}})
-        for (const Phase which : {Phase::geometry, Phase::active, Phase::motion, Phase::springs, Phase::forces, Phase::output})
+        for (const Phase which : {Phase::geometry, Phase::active, Phase::motion, Phase::springs, Phase::slips, Phase::forces, Phase::output})
           benchmark::RegisterBenchmark(
               fmt::format("phases/{}/{}/{}", to_string(set), name, phase_names[static_cast<int>(which)]).c_str(), phase,
               set, bench_scene(name), pass, which)

@@ -5,8 +5,8 @@
 
 namespace platen::bench {
 
-enum class Phase { geometry, active, motion, springs, forces, output };
-inline constexpr const char* phase_names[] = {"geometry", "active", "motion", "springs", "forces", "output"};
+enum class Phase { geometry, active, motion, springs, slips, forces, output };
+inline constexpr const char* phase_names[] = {"geometry", "active", "motion", "springs", "slips", "forces", "output"};
 
 // Goes through the whole chunks of a list, every phase once a chunk but `which` `times`.
 using PhasePass = void (*)(const PairBatch&, const LawConstants&, Phase which, int times);

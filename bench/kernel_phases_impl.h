@@ -18,6 +18,7 @@ class PhasesOfChunk {
       case Phase::active: return active();
       case Phase::motion: return motion(start);
       case Phase::springs: return springs(start);
+      case Phase::slips: return slips(start);
       case Phase::forces: return forces(start);
       case Phase::output: return output(start);
     }
@@ -41,6 +42,9 @@ class PhasesOfChunk {
   }
   void springs(std::int32_t start) {
     law(start, [](auto&... of) __attribute__((always_inline)) { springs_of_pairs<Wide, scene, false>(of...); });
+  }
+  void slips(std::int32_t start) {
+    law(start, [](auto&... of) __attribute__((always_inline)) { slips_of_pairs<Wide, scene, false>(of...); });
   }
   void forces(std::int32_t start) {
     law(start, [](auto&... of) __attribute__((always_inline)) { forces_of_pairs<Wide, scene, false>(of...); });
@@ -80,7 +84,7 @@ template <class I, SceneTraits scene>
 void phase_pass(const PairBatch& b, const LawConstants& c, Phase which, int times) {
   PhasesOfChunk<I, scene> phases(b, c);
   for (std::int32_t start = 0; start + chunk_size <= b.count; start += chunk_size)
-    for (const Phase phase : {Phase::geometry, Phase::active, Phase::motion, Phase::springs, Phase::forces, Phase::output})
+    for (const Phase phase : {Phase::geometry, Phase::active, Phase::motion, Phase::springs, Phase::slips, Phase::forces, Phase::output})
       for (int k = phase == which ? times : 1; k > 0; --k) phases.run(phase, start);
 }
 

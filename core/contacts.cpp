@@ -96,7 +96,7 @@ void install(Batch& batch, Inner& inner, const Particles& p) {
   }
   const std::size_t own = static_cast<std::size_t>(batch.count) * record_size;
   const std::size_t nothing = own + batch.halo.size() * record_size;
-  find_owner_runs(batch.i.data(), batch.padded, batch.first, static_cast<std::int32_t>(nothing * sizeof(double)), batch.to.data());
+  find_owner_runs(batch.i.data(), batch.padded, batch.first, batch.to.data());
   batch.sum.resize(own);
   batch.sum.resize(nothing + record_size);
   batch.ahead = usual_distance(batch, inner.distances);

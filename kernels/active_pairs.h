@@ -77,7 +77,7 @@ class GatheredPairs {
       i_[n] = i_[n - 1], row_j_[n] = row_size * i_[n], to_[n].partner = record_bytes * (i_[n] - b.first);
       tx_[n] = ty_[n] = tz_[n] = sp_[n] = k_t_last_[n] = 0.0;
     }
-    find_owner_runs(i_, n, b.first, b.nothing, to_);
+    find_owner_runs(i_, n, b.first, to_);
   }
 
   PairBatch view(const PairBatch& b) {

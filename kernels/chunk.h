@@ -16,7 +16,8 @@ namespace platen {
 //   active pairs       |
 //   fetch motion       |  v_n v_t lever (m w)
 //   law: springs       |   |   turned limit f_n (k_t beta_n)   S
-//   law: forces        `---`----`------------------------->    |   F T
+//   law: slips         |   |     `------`-----> spring, beta_t |
+//   law: forces        `---`----------------------`----------> |   F T
 //   output                                                     `---`-->
 template <SceneTraits scene>
 struct Chunk {
@@ -32,9 +33,10 @@ struct Chunk {
   alignas(64) Column turned[3];    // tangential spring, turned with the normal [N]
   alignas(64) Column limit, f_n;   // of the tangential force; normal force [N]
   alignas(64) Column beta_n, k_t;  // of each pair: unequal spheres; exponent other than 1
+  alignas(64) Column beta_t;       // tangential dashpot, 0 where the contact slides [kg/s]
   alignas(64) Column F[3];
   alignas(64) Column T[sides][3];
-  alignas(64) Column S[sides];     // |f_hys| lever; relative rolling: |f_hys|, for the second half of the law [N]
+  alignas(64) Column S[sides];     // |f_hys| lever; relative rolling: |f_hys|, for the last third of the law [N]
 
   template <class I>
   static PLATEN_INLINE void put(Column (&to)[3], int at, const Vec3<I>& a) {

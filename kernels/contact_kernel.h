@@ -9,7 +9,7 @@
 
 namespace platen {
 
-// Five loops over each chunk, and after the first, unless the list is dense, the choice of pairs, instead of one with everything in it: a processor looks a few hundred instructions ahead,
+// Six loops over each chunk, and after the first, unless the list is dense, the choice of pairs, instead of one with everything in it: a processor looks a few hundred instructions ahead,
 // so only short bodies let the next contacts begin while the last ones wait for their results.
 template <class I, SceneTraits scene, bool exact, bool guarded = true>
 void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairTotals& totals) noexcept {

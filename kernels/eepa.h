@@ -91,25 +91,23 @@ PLATEN_INLINE Vec3<I> turned_spring(const Vec3<I>& T_old, const Vec3<I>& n, cons
   return scale<I>(I::where(product > tiny, was2 * inverse_sqrt<I, exact>(I::max(product, tiny)), I::set(1.0)), flat);
 }
 
-// How a spring T is cut back to its limit [Eq. 10].
+// Where a spring T, |T|^2 = size2, is at its limit [Eq. 10]. Also where both are 0 (no dashpot on a frictionless contact), and where a
+// spring is no number: its loss is no number then, which the sum of energies shows.
 template <class I>
-struct Cut {
-  typename I::Mask slides;          // the limit holds
-  typename I::Real back;            // what is left of T, 0..1
-};
+PLATEN_INLINE typename I::Mask slides_at(const typename I::Real& limit, const typename I::Real& size2) {
+  return I::not_less(size2, limit * limit);
+}
+// What is left of it, 0..1.
 template <class I, bool exact>
-PLATEN_INLINE Cut<I> cut_to(const typename I::Real& limit, const typename I::Real& size2) {
-  // Also where both are 0 (no dashpot on a frictionless contact), and where a spring is no number: its loss is no number then,
-  // which the sum of energies shows.
-  const auto slides = I::not_less(size2, limit * limit);
-  return {slides, I::where(slides, limit * inverse_sqrt<I, exact>(I::max(size2, I::set(0x1p-900))), I::set(1.0))};
+PLATEN_INLINE typename I::Real cut_to(const typename I::Real& limit, const typename I::Real& size2, const typename I::Mask& slides) {
+  return I::where(slides, limit * inverse_sqrt<I, exact>(I::max(size2, I::set(0x1p-900))), I::set(1.0));
 }
 
 // 2 k_t times the energy that sliding takes where T, |T|^2 = size2, is cut to T_new = back T: the work of the mean of the
 // turned and the new spring over the slip that did not stretch it, (turned + T_new) . (T - T_new), with along = turned . T [N2].
 template <class I>
-PLATEN_INLINE typename I::Real sliding_loss(const Cut<I>& cut, const typename I::Real& size2, const typename I::Real& along) {
-  return I::where(cut.slides, (I::set(1.0) - cut.back) * I::fma(cut.back, size2, along), I::set(0.0));
+PLATEN_INLINE typename I::Real sliding_loss(const typename I::Mask& slides, const typename I::Real& back, const typename I::Real& size2, const typename I::Real& along) {
+  return I::where(slides, (I::set(1.0) - back) * I::fma(back, size2, along), I::set(0.0));
 }
 
 // Energy that plastic flow takes when s_p goes from `sp_old` to `sp`: a function of s_p alone, hence exact for any step

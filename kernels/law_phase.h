@@ -33,11 +33,12 @@ inline constexpr bool common_k_t = scene.exponent == Exponent::one;
 template <SceneTraits scene>
 inline constexpr bool common_beta_n = scene.exponent == Exponent::one && scene.equal_spheres;
 
-// First half of the law: of `width` pairs from position `at` of a chunk on, the normal force, what it limits, and the
+// First third of the law: of `width` pairs from position `at` of a chunk on, the normal force, what it limits, and the
 // tangential spring turned with the normal. Advances the plastic overlap and adds what that takes.
 //
-// Two halves, since each is one long chain of dependent operations with an inverse root in the middle: with both in one
-// loop a processor sees too few pairs at a time to fill the waits [docs/decisions.md, "Fetch and law in two halves"].
+// Three loops, since each pair is one long chain of dependent operations with two inverse roots in it: with all of it in one
+// loop a processor sees too few pairs at a time to fill the waits [docs/decisions.md, "Fetch and law in two halves", "The output is short of
+// instructions, the law of room"].
 template <class I, SceneTraits scene, bool exact>
 PLATEN_INLINE void springs_of_pairs(Chunk<scene>& chunk, int at, const PairBatch& b, const LawConstants& c, std::int32_t k,
                                     ChunkSums<I>& sums) {
@@ -84,31 +85,31 @@ PLATEN_INLINE void springs_of_pairs(Chunk<scene>& chunk, int at, const PairBatch
     I::store(chunk.S[0] + at, I::where(touching, strength * pairs.lever(0), zero));
     if constexpr (!scene.equal_spheres) I::store(chunk.S[1] + at, I::where(touching, strength * pairs.lever(1), zero));
   } else if constexpr (scene.rolling == Rolling::relative) {
-    I::store(chunk.S[0] + at, strength);  // for the second half
+    I::store(chunk.S[0] + at, strength);  // for the last third
   }
 }
 
-// Second half: the spring's advance and limit, dashpots, and what goes to each side.
+// Second third: the spring's advance and its limit, and what sliding takes.
 template <class I, SceneTraits scene, bool exact>
-PLATEN_INLINE void forces_of_pairs(Chunk<scene>& chunk, int at, const PairBatch& b, const LawConstants& c, std::int32_t k,
-                                   ChunkSums<I>& sums) {
-  static_assert(scene.rolling != Rolling::relative || !scene.equal_spheres, "relative rolling is built for unequal spheres only");
+PLATEN_INLINE void slips_of_pairs(Chunk<scene>& chunk, int at, const PairBatch& b, const LawConstants& c, std::int32_t k,
+                                  ChunkSums<I>& sums) {
   using Real = typename I::Real;
   using Energy = PairEnergies<typename SingleOf<I>::Type>;
   const PairsOfChunk<I, scene> pairs(chunk, at);
   const Real zero = I::set(0.0);
   const Vec3<I> none = {zero, zero, zero};
   const auto touching = pairs.delta() > zero;
-  const Real beta_n = common_beta_n<scene> ? I::set(c.beta_n) : pairs.beta_n();
   const Real k_t = common_k_t<scene> ? I::set(c.k_t) : pairs.k_t();
 
   // spring and its limit [Eq. 6, 7, 10]
   const Vec3<I> T = sub_scaled<I>(pairs.turned(), k_t * I::set(c.dt), pairs.v_t());
   const Real size2 = dot(T, T);
-  const Cut<I> cut = cut_to<I, exact>(pairs.limit(), size2);
-  const Vec3<I> T_new = where<I>(touching, scale<I>(cut.back, T), none);
+  const Real limit = pairs.limit();
+  const auto slides = slides_at<I>(limit, size2);
+  const Real back = cut_to<I, exact>(limit, size2, slides);
+  const Vec3<I> T_new = where<I>(touching, scale<I>(back, T), none);
   if constexpr (scene.energy) {
-    const Real loss = sliding_loss<I>(cut, size2, dot(pairs.turned(), T));
+    const Real loss = sliding_loss<I>(slides, back, size2, dot(pairs.turned(), T));
     if constexpr (scene.exponent == Exponent::one) {
       sums.add(&Energy::sliding, I::where(touching, loss, zero) * I::set(c.half_over_k_t), c);
     } else {
@@ -124,10 +125,28 @@ PLATEN_INLINE void forces_of_pairs(Chunk<scene>& chunk, int at, const PairBatch&
   }
   I::store(b.tx + k, T_new.x), I::store(b.ty + k, T_new.y), I::store(b.tz + k, T_new.z);
 
-  // F_t [Eq. 5, 8, 9, A10]
-  const Real beta_t = beta_n * I::set(c.beta_ratio);
+  // tangential dashpot: none where the contact slides [Eq. 9, A10]
+  const Real beta_n = common_beta_n<scene> ? I::set(c.beta_n) : pairs.beta_n();
+  I::store(chunk.beta_t + at, I::where(slides, zero, beta_n * I::set(c.beta_ratio)));
+}
+
+// Last third: dashpots, and what goes to each side.
+template <class I, SceneTraits scene, bool exact>
+PLATEN_INLINE void forces_of_pairs(Chunk<scene>& chunk, int at, const PairBatch& b, const LawConstants& c, std::int32_t k,
+                                   ChunkSums<I>& sums) {
+  static_assert(scene.rolling != Rolling::relative || !scene.equal_spheres, "relative rolling is built for unequal spheres only");
+  using Real = typename I::Real;
+  using Energy = PairEnergies<typename SingleOf<I>::Type>;
+  const PairsOfChunk<I, scene> pairs(chunk, at);
+  const Real zero = I::set(0.0);
+  const Vec3<I> none = {zero, zero, zero};
+  const auto touching = pairs.delta() > zero;
+
+  // F_t [Eq. 5, 8]
+  const Vec3<I> T = {I::load(b.tx + k), I::load(b.ty + k), I::load(b.tz + k)};
+  const Real beta_t = I::load(chunk.beta_t + at);
   const Vec3<I> v_t = pairs.v_t();
-  const Vec3<I> F_t = sub_scaled<I>(T_new, I::where(cut.slides, zero, beta_t), v_t);
+  const Vec3<I> F_t = sub_scaled<I>(T, beta_t, v_t);
   if constexpr (scene.energy) {
     // A dashpot's work in a step is c v(n-1/2) v(n) dt; v(n) is not known yet. Summed by parts that is, to second
     // order, v(n-1/2)^2 (3/4 c(n) + 1/4 c(n-1)) dt: also in the step in which the spheres part [docs/laws.md, "Energy"].
@@ -135,8 +154,8 @@ PLATEN_INLINE void forces_of_pairs(Chunk<scene>& chunk, int at, const PairBatch&
     const auto was_touching = I::fma(v_n, I::set(c.dt), pairs.delta()) > zero;
     const Real now = I::set(0.75 * c.dt), before = I::set(0.25 * c.dt);
     const Real normal_share = I::where(touching, now, zero) + I::where(was_touching, before, zero);
-    const Real tangential_share = I::where(cut.slides, zero, normal_share);
-    const Real viscous = (beta_n * normal_share) * (v_n * v_n) + (beta_t * tangential_share) * dot(v_t, v_t);
+    const Real beta_n = common_beta_n<scene> ? I::set(c.beta_n) : pairs.beta_n();
+    const Real viscous = (beta_n * normal_share) * (v_n * v_n) + (beta_t * normal_share) * dot(v_t, v_t);
     sums.add(&Energy::viscous, I::where(I::either(touching, was_touching), viscous, zero), c);
   }
 
@@ -206,6 +225,8 @@ PLATEN_INLINE bool law_of_chunk(Chunk<scene>& chunk, const PairBatch& b, const L
   ChunkSums<I> sums;
   for (int m = 0; m < active.count; ++m)
     springs_of_pairs<I, scene, exact>(chunk, active.at[m], b, c, start + active.at[m], sums);
+  for (int m = 0; m < active.count; ++m)
+    slips_of_pairs<I, scene, exact>(chunk, active.at[m], b, c, start + active.at[m], sums);
   for (int m = 0; m < active.count; ++m)
     forces_of_pairs<I, scene, exact>(chunk, active.at[m], b, c, start + active.at[m], sums);
   using Sum = typename SingleOf<I>::Type;

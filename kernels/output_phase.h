@@ -7,7 +7,7 @@
 
 namespace platen {
 
-PLATEN_INLINE double* record_at(double* sum, std::int32_t bytes) {
+PLATEN_INLINE double* record_at(double* sum, std::uint32_t bytes) {
   return reinterpret_cast<double*>(reinterpret_cast<char*>(sum) + bytes);
 }
 
@@ -28,9 +28,10 @@ PLATEN_INLINE void output_pairs(const Chunk<scene>& chunk, int at, const PairBat
   }
   for (int lane = 0; lane < I::width; ++lane) {
     const PairTargets to = b.to[k + lane];
-    carried = I::add_if(again_of(to), carried, I::add(I::load_sum(record_at(b.sum, first_of(to))), records[0][lane]));
-    I::store_record(b.sum + record_size * static_cast<std::int64_t>(b.i[k + lane] - b.first), carried);
-    double* partner = record_at(b.sum, to.partner);
+    const std::uint32_t own = own_of(to), begin = again_of(to) != 0 ? static_cast<std::uint32_t>(b.nothing) : own;
+    carried = I::add_if(again_of(to), carried, I::add(I::load_sum(record_at(b.sum, begin)), records[0][lane]));
+    I::store_record(record_at(b.sum, own), carried);
+    double* partner = record_at(b.sum, static_cast<std::uint32_t>(to.partner));
     I::store_record(partner, I::add_reaction(I::load_sum(partner), records[Chunk<scene>::sides - 1][lane]));
   }
 }

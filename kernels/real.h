@@ -291,21 +291,23 @@ struct Avx512 {
 
   template <int unit, int n>
   static PLATEN_INLINE void fetch_rows(const double* rows, const std::int32_t* place, Real (&fields)[n]) {
+    // Of eight rows 0 and 2, 1 and 3, 4 and 6, 5 and 7 share a register: so two shuffles without a register of indices bring
+    // their numbers into order.
     __m512d part[n / 4][4];
-    for (int lane = 0; lane < 4; ++lane) {
+    for (int pair = 0; pair < 4; ++pair) {
+      const int lane = pair + (pair & 2);
       const double* p = rows + unit * static_cast<std::int64_t>(place[lane]);
-      const double* q = rows + unit * static_cast<std::int64_t>(place[lane + 4]);
+      const double* q = rows + unit * static_cast<std::int64_t>(place[lane + 2]);
       for (int k = 0; k < n / 4; ++k)
-        part[k][lane] = _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(p + 4 * k)), _mm256_loadu_pd(q + 4 * k), 1);
+        part[k][pair] = _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(p + 4 * k)), _mm256_loadu_pd(q + 4 * k), 1);
     }
-    const __m512i even = _mm512_set_epi64(13, 12, 5, 4, 9, 8, 1, 0), odd = _mm512_set_epi64(15, 14, 7, 6, 11, 10, 3, 2);
     for (int k = 0; k < n / 4; ++k) {
       const __m512d ab_lo = _mm512_unpacklo_pd(part[k][0], part[k][1]), ab_hi = _mm512_unpackhi_pd(part[k][0], part[k][1]);
       const __m512d cd_lo = _mm512_unpacklo_pd(part[k][2], part[k][3]), cd_hi = _mm512_unpackhi_pd(part[k][2], part[k][3]);
-      fields[4 * k + 0] = _mm512_permutex2var_pd(ab_lo, even, cd_lo);
-      fields[4 * k + 1] = _mm512_permutex2var_pd(ab_hi, even, cd_hi);
-      fields[4 * k + 2] = _mm512_permutex2var_pd(ab_lo, odd, cd_lo);
-      fields[4 * k + 3] = _mm512_permutex2var_pd(ab_hi, odd, cd_hi);
+      fields[4 * k + 0] = _mm512_shuffle_f64x2(ab_lo, cd_lo, 0x88);
+      fields[4 * k + 1] = _mm512_shuffle_f64x2(ab_hi, cd_hi, 0x88);
+      fields[4 * k + 2] = _mm512_shuffle_f64x2(ab_lo, cd_lo, 0xdd);
+      fields[4 * k + 3] = _mm512_shuffle_f64x2(ab_hi, cd_hi, 0xdd);
     }
   }
   static PLATEN_INLINE void scatter4(double* row, int first, const Real (&fields)[4]) {
@@ -327,16 +329,14 @@ struct Avx512 {
       t[2 * k] = _mm512_unpacklo_pd(r[2 * k], r[2 * k + 1]);
       t[2 * k + 1] = _mm512_unpackhi_pd(r[2 * k], r[2 * k + 1]);
     }
-    const __m512i even = _mm512_set_epi64(13, 12, 5, 4, 9, 8, 1, 0), odd = _mm512_set_epi64(15, 14, 7, 6, 11, 10, 3, 2);
-    for (int h = 0; h < 2; ++h) {
-      u[4 * h + 0] = _mm512_permutex2var_pd(t[4 * h], even, t[4 * h + 2]);
-      u[4 * h + 1] = _mm512_permutex2var_pd(t[4 * h + 1], even, t[4 * h + 3]);
-      u[4 * h + 2] = _mm512_permutex2var_pd(t[4 * h], odd, t[4 * h + 2]);
-      u[4 * h + 3] = _mm512_permutex2var_pd(t[4 * h + 1], odd, t[4 * h + 3]);
-    }
+    for (int h = 0; h < 2; ++h)
+      for (int k = 0; k < 2; ++k) {
+        u[4 * h + k] = _mm512_shuffle_f64x2(t[4 * h + k], t[4 * h + k + 2], 0x88);
+        u[4 * h + k + 2] = _mm512_shuffle_f64x2(t[4 * h + k], t[4 * h + k + 2], 0xdd);
+      }
     for (int k = 0; k < 4; ++k) {
-      r[k] = _mm512_shuffle_f64x2(u[k], u[k + 4], 0x44);
-      r[k + 4] = _mm512_shuffle_f64x2(u[k], u[k + 4], 0xee);
+      r[k] = _mm512_shuffle_f64x2(u[k], u[k + 4], 0x88);
+      r[k + 4] = _mm512_shuffle_f64x2(u[k], u[k + 4], 0xdd);
     }
   }
   static PLATEN_INLINE void to_records(const Real (&fields)[8], Record (&records)[8]) {

@@ -67,15 +67,18 @@ struct LawConstants {
 //   i             17     17     17     18    20  ...   owner side: particle of this batch
 //   row_j         216    300    10836  300   252 ...   row of the partner j, any particle: 12 j, in doubles from `rows`
 //   to.partner    64     512    32768  512   256 ...   where j's share goes, in bytes from `sum`: an own particle, or a halo slot
-//   to.first      0      zero   zero   64    192 ...   where the owner is another one than before: its record; else the one that stays zero
+//   own_of(to)    0      0      0      64    192 ...   where the owner's sum is, in the same bytes
+//   again_of(to)         yes    yes                    the owner is that of the contact before
 //
 // Bytes, because an address that takes a multiplication costs a tenth of the output phase.
 struct PairTargets {
   std::int32_t partner;
-  // Four times the place of `first`, and the lowest eight bits set where the owner is that of the contact before: one array less
-  // to follow, of which a processor can only follow so many.
-  std::int32_t first_and_again;
+  // 256 times the place of the owner's sum, and the lowest eight bits set where the owner is that of the contact before [kernels/owner_runs.h]:
+  // one array less to follow, of which a processor can only follow so many. Without a sign, and both parts at its ends, it takes two instructions to
+  // take apart, and the output phase has few to spare.
+  std::uint32_t own_and_again;
 };
+inline constexpr std::int32_t most_spheres_of_batch = 1 << 18;  // whose sums lie below 2^24 bytes
 
 // Lines of memory that a task to come will need.
 struct AskedLines {

@@ -138,11 +138,23 @@ TEST(ActivePairs, RunsOfOneOwnerAmongThem) {
   gathered.take(s.chunk, s.batch, 0, active);
   const PairBatch view = gathered.view(s.batch);
   const bool again[] = {false, true, false, false, true, false};
-  const int owner[] = {101, 0, 107, 113, 0, 119};  // whose sum the run begins with
+  const int owner[] = {101, 101, 107, 113, 113, 119};
   for (int n = 0; n < 6; ++n) {
     EXPECT_EQ(again_of(view.to[n]), again[n] ? 0xff : 0);
-    EXPECT_EQ(first_of(view.to[n]), record_bytes * (again[n] ? 900 : owner[n] - 100));
+    EXPECT_EQ(own_of(view.to[n]), static_cast<std::uint32_t>(record_bytes * (owner[n] - 100)));
   }
+}
+
+TEST(OwnerRuns, FitTheLargestBatch) {
+  constexpr std::int32_t first = 8000, last = first + most_spheres_of_batch - 1;
+  const std::int32_t i[] = {first, last, last};
+  PairTargets to[3] = {};
+  find_owner_runs(i, 3, first, to);
+  EXPECT_EQ(own_of(to[0]), 0u);
+  for (const int k : {1, 2}) EXPECT_EQ(own_of(to[k]), std::uint32_t{record_bytes} * (most_spheres_of_batch - 1));
+  EXPECT_EQ(again_of(to[0]), 0);
+  EXPECT_EQ(again_of(to[1]), 0);
+  EXPECT_EQ(again_of(to[2]), 0xff);
 }
 
 // With lists so wide that most pairs are apart, and vectors are passed over or drawn together.
