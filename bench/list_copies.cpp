@@ -98,7 +98,8 @@ MotionBatch BatchCopy::motion(StateCopy& s, bool clears) {
           clears ? sum.data() : nowhere.data(),
           clears ? record_size : 0,
           speed2.data(),
-          count};
+          count,
+          false};
 }
 
 std::int64_t BatchCopy::list_bytes() const {

@@ -259,7 +259,7 @@ void Simulation::integrate(Batch& b, const MotionConstants& c, bool keeps_sums) 
   const MotionBatch batch{column(p.x), column(p.y), column(p.z), column(p.vx), column(p.vy), column(p.vz), column(p.ux),
                           column(p.uy), column(p.uz), column(p.inverse_mass), column(p.mass), column(p.radius),
                           column(p.inverse_radius), p.rows.data() + row_size * first, p.image.data() + 2 * first,
-                          b.sum.data(), keeps_sums ? nowhere : b.sum.data(), keeps_sums ? 0 : record_size, speed2_.data() + first, b.count};
+                          b.sum.data(), keeps_sums ? nowhere : b.sum.data(), keeps_sums ? 0 : record_size, speed2_.data() + first, b.count, asks_ahead_};
   MotionTotals totals;
   kernels_.motion(batch, c, totals);
   // The places that fill up the last vector rest where they are.

@@ -153,10 +153,10 @@ PLATEN_INLINE void forces_of_pairs(Chunk<scene>& chunk, int at, const PairBatch&
     const Real v_n = pairs.v_n();
     const auto was_touching = I::fma(v_n, I::set(c.dt), pairs.delta()) > zero;
     const Real now = I::set(0.75 * c.dt), before = I::set(0.25 * c.dt);
-    const Real normal_share = I::where(touching, now, zero) + I::where(was_touching, before, zero);
+    const Real of_now = I::where(touching, now, zero), share = I::where(was_touching, of_now + before, of_now);
     const Real beta_n = common_beta_n<scene> ? I::set(c.beta_n) : pairs.beta_n();
-    const Real viscous = (beta_n * normal_share) * (v_n * v_n) + (beta_t * normal_share) * dot(v_t, v_t);
-    sums.add(&Energy::viscous, I::where(I::either(touching, was_touching), viscous, zero), c);
+    const Real power = I::fma(beta_t, dot(v_t, v_t), beta_n * (v_n * v_n));
+    sums.add(&Energy::viscous, I::where(I::either(touching, was_touching), share * power, zero), c);
   }
 
   // to each side: F, T = lever n x F_t; rolling [Eq. 11, A12-A14]

@@ -218,6 +218,7 @@ struct MotionBatch {
   std::int64_t cleared_step;    // from one to the next, in doubles; 0 where it is one other
   double* speed2;          // of each particle: |v - mean|^2 is added [m2/s2]
   std::int32_t count;      // multiple of padding
+  bool asks;               // for spheres ahead, where a near cache does not hold the bed
 };
 
 struct MotionTotals {

@@ -1,5 +1,5 @@
 # The machine code of AskForOthers::chunk [kernels/ask_ahead.h] asks for something, and somebody calls it: g++ 12 leaves out calls of a
-# function in which it sees nothing but prefetches, and no result would tell.
+# function in which it sees nothing but prefetches, and no result would tell. So do the motion kernels [kernels/motion_kernel.h].
 #
 #   cmake -DOBJDUMP=objdump -DOBJECTS=a.o,b.o -P check_prefetches.cmake      looks at every object named isa_<set>
 string(REPLACE "," ";" objects "${OBJECTS}")
@@ -15,6 +15,14 @@ foreach(object IN LISTS objects)
     message(FATAL_ERROR "${OBJDUMP} cannot read ${object}")
   elseif(NOT found EQUAL 3)
     message(FATAL_ERROR "AskForOthers::chunk of ${object} has no prefetch, or nobody calls it")
+  endif()
+  if(NOT object MATCHES "isa_scalar")  # single numbers are never waited for
+    execute_process(COMMAND ${OBJDUMP} -d --no-show-raw-insn ${object}
+      COMMAND awk "/>:$/ {inside = /motion_kernel/; kernels += inside; asks = 0} inside && /prefetch/ && !asks {asks = 1; ++asking} END {print (kernels > 0 && asking == kernels)}"
+      OUTPUT_VARIABLE found OUTPUT_STRIP_TRAILING_WHITESPACE)
+    if(NOT found EQUAL 1)
+      message(FATAL_ERROR "a motion kernel of ${object} has no prefetch")
+    endif()
   endif()
   math(EXPR looked "${looked} + 1")
 endforeach()
