@@ -31,6 +31,7 @@ BatchCopy::BatchCopy(const Batch& b)
     : i(copy_of(b.i)),
       row_j(copy_of(b.row_j)),
       targets(copy_of(b.to)),
+      owners(copy_of(b.owners_of_eight)),
       sp(copy_of(b.sp)),
       tx(copy_of(b.tx)),
       ty(copy_of(b.ty)),
@@ -62,7 +63,7 @@ BatchCopy::BatchCopy(const Batch& b)
 PairBatch BatchCopy::pairs(const StateCopy& state) {
   PairBatch b{};
   b.rows = state.rows.data();
-  b.i = i.data(), b.row_j = row_j.data(), b.to = targets.data();
+  b.i = i.data(), b.row_j = row_j.data(), b.to = targets.data(), b.owners = owners.data();
   b.sp = sp.data(), b.tx = tx.data(), b.ty = ty.data(), b.tz = tz.data();
   b.k_t_last = k_t_last.empty() ? nullptr : k_t_last.data();
   b.sum = sum.data();
@@ -104,8 +105,8 @@ MotionBatch BatchCopy::motion(StateCopy& s, bool clears) {
 
 std::int64_t BatchCopy::list_bytes() const {
   const std::int64_t history = k_t_last.empty() ? 4 : 5;
-  return padded *
-         static_cast<std::int64_t>(2 * sizeof(std::int32_t) + sizeof(PairTargets) + 2 * sizeof(double) * static_cast<std::size_t>(history));
+  const auto pair = static_cast<std::int64_t>(2 * sizeof(std::int32_t) + sizeof(PairTargets)) + 2 * history * static_cast<std::int64_t>(sizeof(double));
+  return padded * pair + padded / 8 * static_cast<std::int64_t>(sizeof(OwnersOfEight));
 }
 
 std::int64_t BatchCopy::row_bytes() const {

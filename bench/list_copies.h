@@ -34,6 +34,7 @@ struct BatchCopy {
   explicit BatchCopy(const Batch& b);
   AlignedArray<std::int32_t> i, row_j;
   AlignedArray<PairTargets> targets;
+  AlignedArray<OwnersOfEight> owners;
   AlignedArray<double> sp, tx, ty, tz, k_t_last, sum;
   std::vector<double> speed2;
   AlignedArray<double> nowhere;

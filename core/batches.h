@@ -42,6 +42,7 @@ struct Batch {
   std::int32_t used = 0, padded = 0;  // pairs of the inner list
   AlignedArray<std::int32_t> i, row_j;  // kernels/views.h
   AlignedArray<PairTargets> to;
+  AlignedArray<OwnersOfEight> owners_of_eight;  // one for each eight pairs
   AlignedArray<std::int32_t> from;      // place in the outer list
   std::int32_t j(std::size_t k) const { return row_j[k] / row_size; }
   AlignedArray<double> sp, tx, ty, tz, k_t_last;

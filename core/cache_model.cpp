@@ -11,7 +11,7 @@ double state_bytes(const Batch& b) {
 
 double contact_bytes(const Batch& b) {
   const double history = sizeof(double) * (b.k_t_last.empty() ? 4 : 5);
-  return (history + 2 * sizeof(std::int32_t) + sizeof(PairTargets)) * static_cast<double>(b.padded);
+  return (history + 2 * sizeof(std::int32_t) + sizeof(PairTargets) + sizeof(OwnersOfEight) / 8.0) * static_cast<double>(b.padded);
 }
 
 double touched_bytes(const std::vector<Batch>& batches) {

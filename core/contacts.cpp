@@ -97,6 +97,8 @@ void install(Batch& batch, Inner& inner, const Particles& p) {
   const std::size_t own = static_cast<std::size_t>(batch.count) * record_size;
   const std::size_t nothing = own + batch.halo.size() * record_size;
   find_owner_runs(batch.i.data(), batch.padded, batch.first, batch.to.data());
+  batch.owners_of_eight.assign(size / 8, {});
+  find_owners(batch.i.data(), batch.padded, batch.first, batch.first + batch.count, batch.owners_of_eight.data());
   batch.sum.resize(own);
   batch.sum.resize(nothing + record_size);
   batch.ahead = usual_distance(batch, inner.distances);

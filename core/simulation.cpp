@@ -319,7 +319,7 @@ void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, 
   const auto nothing = static_cast<std::int32_t>(b.sum.size() * sizeof(double)) - record_bytes;
   // By the last pass, which may have had the list before a prune; none after a rebuild. Whether pairs are passed over changes no bit.
   const bool dense = 4 * b.pair_totals.contacts > 3 * std::int64_t{b.padded};
-  PairBatch pairs{particles_.rows.data(), b.i.data(), b.row_j.data(), b.to.data(), b.sp.data(), b.tx.data(),
+  PairBatch pairs{particles_.rows.data(), b.i.data(), b.row_j.data(), b.to.data(), b.owners_of_eight.data(), b.sp.data(), b.tx.data(),
                   b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum.data(), b.first, b.padded, b.first + b.count, nothing, dense, leap,
                   particles_.x.data(), particles_.y.data(), particles_.z.data(), particles_.vx.data(),
                   particles_.vy.data(), particles_.vz.data(), particles_.ux.data(), particles_.uy.data(),
@@ -371,7 +371,7 @@ StretchesOfLines Simulation::lines_of(const std::vector<Asked>& asks) const {
       if (built_scenes[static_cast<std::size_t>(kernels_.scene)].traits.plasticity) add(b.sp.data(), listed);
       for (const auto* column : {&b.tx, &b.ty, &b.tz, &b.k_t_last})
         if (!column->empty()) add(column->data(), listed);
-      add(b.i.data(), listed), add(b.row_j.data(), listed), add(b.to.data(), listed);
+      add(b.i.data(), listed), add(b.row_j.data(), listed), add(b.to.data(), listed), add(b.owners_of_eight.data(), listed / 8);
       continue;
     }
     for (const auto* column : {&p.x, &p.y, &p.z, &p.vx, &p.vy, &p.vz, &p.ux, &p.uy, &p.uz, &p.radius, &p.inverse_radius, &p.mass, &p.inverse_mass, &speed2_})

@@ -78,11 +78,12 @@ class GatheredPairs {
       tx_[n] = ty_[n] = tz_[n] = sp_[n] = k_t_last_[n] = 0.0;
     }
     find_owner_runs(i_, n, b.first, to_);
+    if constexpr (SingleOf<I>::Type::picks) find_owners(i_, n, b.first, b.end, owners_);
   }
 
   PairBatch view(const PairBatch& b) {
     PairBatch v = b;
-    v.i = i_, v.row_j = row_j_, v.to = to_;
+    v.i = i_, v.row_j = row_j_, v.to = to_, v.owners = owners_;
     v.tx = tx_, v.ty = ty_, v.tz = tz_, v.sp = sp_, v.k_t_last = k_t_last_;
     return v;
   }
@@ -101,6 +102,7 @@ class GatheredPairs {
   alignas(64) Column tx_, ty_, tz_, sp_, k_t_last_;
   alignas(64) std::int32_t from_[chunk_size], i_[chunk_size], row_j_[chunk_size];
   alignas(64) PairTargets to_[chunk_size];
+  OwnersOfEight owners_[chunk_size / 8];
   int count_ = 0;
 };
 

@@ -22,9 +22,10 @@ PLATEN_INLINE RowPart<I> fetch_part(const double* rows, int part, const std::int
 template <class I, SceneTraits scene, int parts>
 PLATEN_INLINE void fetch_owners(const PairBatch& b, int first_part, std::int32_t k, RowPart<I> (&f)[parts]) {
   if constexpr (I::picks && scene.equal_spheres) {
-    const std::int32_t base = b.i[k];
-    if (b.i[k + I::width - 1] - base < I::width && base + I::width <= b.end) {
-      const auto where = I::places(b.i + k, base);
+    static_assert(I::width == 8);
+    const OwnersOfEight& owners = b.owners[k / 8];
+    if (const std::int64_t base = owners.first; base >= 0) {
+      const auto where = I::places(owners.place);
       const double* const columns[3][3] = {{b.x, b.y, b.z}, {b.vx, b.vy, b.vz}, {b.ux, b.uy, b.uz}};
       for (int part = 0; part < parts; ++part) {
         for (int axis = 0; axis < 3; ++axis) f[part].of[axis] = I::pick(columns[first_part + part][axis] + base, where);

@@ -236,10 +236,9 @@ struct Avx512 {
   static constexpr bool picks = true;
   using Places = __m512i;
 
-  // places[lane] = index[lane] - base, for pick(); each must be in 0..7.
-  static PLATEN_INLINE Places places(const std::int32_t* index, std::int32_t base) {
-    const __m256i i = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(index));
-    return _mm512_cvtepi32_epi64(_mm256_sub_epi32(i, _mm256_set1_epi32(base)));
+  // For pick(); each must be in 0..7.
+  static PLATEN_INLINE Places places(const std::uint8_t (&place)[8]) {
+    return _mm512_cvtepu8_epi64(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(place)));
   }
   // p[places[lane]]: one load and one permutation where a gather would take eight loads.
   static PLATEN_INLINE Real pick(const double* p, const Places& where) {

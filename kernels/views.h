@@ -80,6 +80,12 @@ struct PairTargets {
 };
 inline constexpr std::int32_t most_spheres_of_batch = 1 << 18;  // whose sums lie below 2^24 bytes
 
+// The owners of eight contacts that follow each other: mostly within eight places, which one load of a column brings.
+struct OwnersOfEight {
+  std::int32_t first;     // of such eight places; -1 where they are farther apart
+  std::uint8_t place[8];  // of each contact's owner from there
+};
+
 // Lines of memory that a task to come will need.
 struct AskedLines {
   const char* first;
@@ -90,6 +96,7 @@ struct PairBatch {
   const double* rows;
   const std::int32_t *i, *row_j;
   const PairTargets* to;
+  const OwnersOfEight* owners;  // of each eight contacts
   double *sp, *tx, *ty, *tz;
   double* k_t_last;     // exponent other than 1: k_t of the step before; null otherwise
   double* sum;          // records: of own particles, halo slots, and one that stays zero

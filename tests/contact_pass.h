@@ -35,7 +35,7 @@ inline Pass pass(const Simulation& sim, const Batch& b, bool dense, double leap_
   LawConstants law = sim.law();
   law.dt = sim.time_step();
   const auto nothing = static_cast<std::int32_t>(sum.size() * sizeof(double)) - record_bytes;
-  PairBatch pairs{p.rows.data(), b.i.data(), b.row_j.data(), b.to.data(), sp.data(), tx.data(), ty.data(), tz.data(),
+  PairBatch pairs{p.rows.data(), b.i.data(), b.row_j.data(), b.to.data(), b.owners_of_eight.data(), sp.data(), tx.data(), ty.data(), tz.data(),
                   k_t.empty() ? nullptr : k_t.data(), sum.data(), b.first, b.padded, b.first + b.count, nothing, dense, leap_bound,
                   p.x.data(), p.y.data(), p.z.data(), p.vx.data(), p.vy.data(), p.vz.data(), p.ux.data(), p.uy.data(), p.uz.data(), ahead, p.padded, ahead != 0, nullptr, 0, 0};
   others.put_into(pairs);

@@ -41,7 +41,7 @@ struct Sample {
     }
     batch.i = i.data(), batch.row_j = row_j.data(), batch.to = to.data();
     batch.sp = sp.data(), batch.tx = tx.data(), batch.ty = ty.data(), batch.tz = tz.data(), batch.k_t_last = k_t_last.data();
-    batch.first = 100, batch.count = chunk_size, batch.nothing = record_bytes * 900, batch.leap = leap;
+    batch.first = 100, batch.end = 900, batch.count = chunk_size, batch.nothing = record_bytes * 900, batch.leap = leap;
   }
   ActiveVectors active() const {
     ActiveVectors found;
@@ -155,6 +155,20 @@ TEST(OwnerRuns, FitTheLargestBatch) {
   EXPECT_EQ(again_of(to[0]), 0);
   EXPECT_EQ(again_of(to[1]), 0);
   EXPECT_EQ(again_of(to[2]), 0xff);
+}
+
+// Of eight owners within eight places each is found from the first of them, places of the batch itself at its end too; of others none.
+TEST(OwnerRuns, OwnersOfEight) {
+  constexpr std::int32_t first = 16, end = 48;
+  const std::int32_t i[] = {16, 16, 17, 17, 20, 23, 23, 23, 24, 25, 25, 26, 30, 31, 31, 32, 46, 46, 46, 46, 47, 47, 47, 47};
+  OwnersOfEight owners[3];
+  find_owners(i, 24, first, end, owners);
+  EXPECT_EQ(owners[1].first, -1) << "24 to 32";
+  for (const int group : {0, 2}) {
+    EXPECT_GE(owners[group].first, first);
+    EXPECT_LE(owners[group].first, end - 8);
+    for (int lane = 0; lane < 8; ++lane) EXPECT_EQ(owners[group].first + owners[group].place[lane], i[8 * group + lane]);
+  }
 }
 
 // With lists so wide that most pairs are apart, and vectors are passed over or drawn together.

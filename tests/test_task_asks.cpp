@@ -169,6 +169,7 @@ TEST(TaskAsks, LinesOfABatch) {
       for (const auto* column : {&b.sp, &b.tx, &b.ty, &b.tz}) contacts.push_back({column->data(), 8 * static_cast<std::size_t>(b.padded)});
       contacts.push_back({b.i.data(), 4 * static_cast<std::size_t>(b.padded)}), contacts.push_back({b.row_j.data(), 4 * static_cast<std::size_t>(b.padded)});
       contacts.push_back({b.to.data(), 8 * static_cast<std::size_t>(b.padded)});
+      contacts.push_back({b.owners_of_eight.data(), 12 * static_cast<std::size_t>(b.padded) / 8});
       for (const auto& [what, arrays] : {std::pair{false, state}, {true, contacts}}) {
         const std::vector<AskedLines> found = stretches_of(sim.lines_of({{k, what, 0.0, 1.0, 0}}));
         EXPECT_EQ(found.size(), arrays.size() + (what ? 0 : 1));  // and the speeds, which nobody else sees
