@@ -49,15 +49,15 @@ class PhasesOfChunk {
   void forces(std::int32_t start) {
     law(start, [](auto&... of) __attribute__((always_inline)) { forces_of_pairs<Wide, scene, false>(of...); });
   }
-  // One half of it.
-  template <class Half>
-  __attribute__((noinline)) void law(std::int32_t start, const Half& half) {
+  // A third of it.
+  template <class Third>
+  __attribute__((noinline)) void law(std::int32_t start, const Third& third) {
     const PairBatch b = b_;
     const LawConstants c = c_;
     ChunkSums<Wide> sums;
     for (int at = 0; at < chunk_size; at += Wide::width) {
       const std::int32_t k = start + at;
-      half(chunk_, at, b, c, k, sums);
+      third(chunk_, at, b, c, k, sums);
     }
     keep(sums);
   }

@@ -35,7 +35,10 @@ std::int64_t work_of(const std::vector<Batch>& batches) {
   return work;
 }
 
-int batches_of(std::int32_t padded, int size) { return static_cast<int>(std::lround(static_cast<double>(padded) / size)); }
+int batches_of(std::int32_t padded, int size) {
+  // What rounding leaves for one batch is at most half as much again.
+  return static_cast<int>(std::lround(static_cast<double>(padded) / std::min(size, most_spheres_of_batch / 2)));
+}
 
 bool work_is_even(const std::vector<Batch>& batches, int parts) {
   std::int64_t spheres = 0;

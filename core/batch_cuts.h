@@ -14,7 +14,7 @@ inline constexpr std::int32_t particles_in_cache = 60000;
 // Batches where nothing else is asked for: enough for all threads, none too small to be worth a task.
 // `even`: equal stretches of the Morton curve are equal work; of interest to two threads only.
 int automatic_batches(std::int32_t particles, int threads, bool even);
-// Batches of about so many particles each.
+// Batches of about so many particles each, none of more than most_spheres_of_batch.
 int batches_of(std::int32_t padded, int size);
 
 // What a step has to do for a batch, about: a pair costs about as much as a sphere.

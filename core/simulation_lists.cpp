@@ -348,7 +348,7 @@ void Simulation::rebuild_with(const PairHistories& pairs) {
 
 // `even`: equal stretches of the curve are equal work.
 int Simulation::batch_count(bool even) const {
-  return engine_.batch > 0 ? batches_of(particles_.padded, std::min(engine_.batch, most_spheres_of_batch)) : automatic_batches(particles_.count, engine_.threads, even);
+  return engine_.batch > 0 ? batches_of(particles_.padded, engine_.batch) : automatic_batches(particles_.count, engine_.threads, even);
 }
 
 void Simulation::cut_into_batches(const PairHistories& pairs, const std::int32_t* bucket, const Cuts& cuts) {

@@ -15,10 +15,10 @@ namespace platen {
 //   fetch geometry   delta n 1/distance (R)
 //   active pairs       |
 //   fetch motion       |  v_n v_t lever (m w)
-//   law: springs       |   |   turned limit f_n (k_t beta_n)   S
-//   law: slips         |   |     `------`-----> spring, beta_t |
-//   law: forces        `---`----------------------`----------> |   F T
-//   output                                                     `---`-->
+//   law: springs       |   |   turned limit (k_t) f_n (beta_n)                  S
+//   law: slips         `---`---`------`------`---------`-------> spring beta_t  |
+//   law: forces        `---`----------------------`----`---------`------`-------`-> F T
+//   output                                                                      `---`-`-->
 template <SceneTraits scene>
 struct Chunk {
   static constexpr int sides = scene.equal_spheres ? 1 : 2;  // of unequal spheres, each has its own

@@ -10,7 +10,7 @@
 namespace platen {
 
 // Asks for all that a vector of spheres some vectors on has: twenty streams and more, in which a processor foresees less than there is time for.
-// Behind the last sphere too, where nobody needs it.
+// Not behind the batch's last, where another thread may be at work.
 template <class I, bool equal_spheres>
 PLATEN_INLINE void ask_for_spheres(const MotionBatch& b, std::int64_t k) {
   constexpr std::int64_t line = 8;
@@ -29,7 +29,7 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
   Real rolled = zero;
   Real strongest = zero;  // largest force on a sphere, squared
   for (std::int32_t k = 0; k < b.count; k += I::width) {
-    if (I::width > 1 && b.asks) ask_for_spheres<I, equal_spheres>(b, k + 4 * I::width);
+    if (I::width > 1 && b.asks && k + 4 * I::width < b.count) ask_for_spheres<I, equal_spheres>(b, k + 4 * I::width);
     typename I::Record records[I::width];
     for (int lane = 0; lane < I::width; ++lane)
       records[lane] = I::load_record(b.sum + record_size * static_cast<std::int64_t>(k + lane));

@@ -9,7 +9,7 @@ namespace platen {
 PLATEN_INLINE std::uint32_t own_of(const PairTargets& to) { return to.own_and_again >> 8; }
 PLATEN_INLINE std::uint8_t again_of(const PairTargets& to) { return static_cast<std::uint8_t>(to.own_and_again); }
 
-// Puts that into the targets of `count` contacts, owned by i, ascending. `first`: the batch's first particle, at most
+// Puts that into the targets of `count` contacts, owned by i, ascending. `first`: the batch's first particle, less than
 // most_spheres_of_batch before any of them.
 PLATEN_INLINE void find_owner_runs(const std::int32_t* i, std::int32_t count, std::int32_t first, PairTargets* to) {
   for (std::int32_t k = 0; k < count; ++k) {

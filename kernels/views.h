@@ -78,7 +78,7 @@ struct PairTargets {
   // take apart, and the output phase has few to spare.
   std::uint32_t own_and_again;
 };
-inline constexpr std::int32_t most_spheres_of_batch = 1 << 18;  // whose sums lie below 2^24 bytes
+inline constexpr std::int32_t most_spheres_of_batch = 1 << 18;  // whose sums lie below 2^24 bytes [core/batch_cuts.h, batches_of]
 
 // The owners of eight contacts that follow each other: mostly within eight places, which one load of a column brings.
 struct OwnersOfEight {

@@ -100,6 +100,12 @@ TEST(Cuts, EqualOnesAreEqual) {
     }
   EXPECT_EQ(equal_cuts(0, 3), (Cuts{0, 0}));
   EXPECT_EQ(batches_of(1000, 300), 3);
+  // However large a batch is asked for, places of its sums fit into what lists say of them [kernels/owner_runs.h].
+  for (const std::int32_t padded : {299000, 393208, 655000, 1000000, 3000000})
+    for (const int size : {130000, 200000, 262144, 1000000000}) {
+      const Cuts cuts = equal_cuts(padded, batches_of(padded, size));
+      for (std::size_t k = 1; k < cuts.size(); ++k) EXPECT_LE(cuts[k] - cuts[k - 1], most_spheres_of_batch) << padded << " " << size;
+    }
 }
 
 // Work of a stretch of the curve, as the batches before tell it.
