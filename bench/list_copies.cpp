@@ -45,7 +45,6 @@ BatchCopy::BatchCopy(const Batch& b)
       padded(b.padded),
       halo(b.halo),
       incoming(b.incoming) {
-  nowhere.resize(record_size);
   for (int plate = 0; plate < plate_count; ++plate) {
     const PlateList& from = b.plates[plate];
     if (from.used == 0) continue;
@@ -96,8 +95,7 @@ MotionBatch BatchCopy::motion(StateCopy& s, bool clears) {
           s.rows.data() + row_size * at,
           s.image.data() + 2 * at,
           sum.data(),
-          clears ? sum.data() : nowhere.data(),
-          clears ? record_size : 0,
+          clears,
           speed2.data(),
           count,
           false};

@@ -37,7 +37,6 @@ struct BatchCopy {
   AlignedArray<OwnersOfEight> owners;
   AlignedArray<double> sp, tx, ty, tz, k_t_last, sum;
   std::vector<double> speed2;
-  AlignedArray<double> nowhere;
   std::int32_t first = 0, count = 0, used = 0, padded = 0;
   std::vector<std::int32_t> halo;
   std::vector<Incoming> incoming;

@@ -60,13 +60,4 @@ void Particles::write_rows(const ParallelFor& parallel) {
   });
 }
 
-void Particles::read_rows() {
-  for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) {
-    const double* row = rows.data() + row_size * k;
-    x[k] = row[0], y[k] = row[1], z[k] = row[2];
-    vx[k] = row[4], vy[k] = row[5], vz[k] = row[6];
-    ux[k] = row[8], uy[k] = row[9], uz[k] = row[10];
-  }
-}
-
 }  // namespace platen

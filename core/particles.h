@@ -19,7 +19,7 @@ struct Particles {
   AlignedArray<double> vx, vy, vz;  // half-step velocity [m/s]
   AlignedArray<double> ux, uy, uz;  // R omega at the half step [m/s]
   AlignedArray<double> radius, inverse_radius, mass, inverse_mass;  // [m, 1/m, kg, 1/kg]; empty where equal
-  AlignedArray<double> rows;        // copies in the shape that contacts fetch, kernels/views.h; a run that is redone starts from them
+  AlignedArray<double> rows;        // copies in the shape that contacts fetch, kernels/views.h
   double common_radius = 0.0, common_mass = 0.0;
 
   // What it does not.
@@ -34,7 +34,6 @@ struct Particles {
   void resize(std::int32_t n, bool equal_spheres);
   void permute(const std::vector<std::int32_t>& order, const ParallelFor& parallel = in_turn);  // order[new place] = old place
   void write_rows(const ParallelFor& parallel = in_turn);  // rows from the arrays
-  void read_rows();                                        // the other way round
 };
 
 // Mass of a sphere, 4/3 pi R^3 rho [kg].

@@ -248,18 +248,19 @@ void Simulation::merge(Batch& b) {
   }
 }
 
-// `keeps_sums`: a run of steps may have to go back to them. Otherwise they are zero afterwards, for the next contacts.
-void Simulation::integrate(Batch& b, const MotionConstants& c, bool keeps_sums) {
+// Kick and drift. The sums of the batch's particles are zero afterwards, for the next contacts. `saves`: for going back to
+// [simulation_detail.h, Saved].
+void Simulation::integrate(Batch& b, const MotionConstants& c, bool saves) {
   const auto index = static_cast<std::size_t>(&b - batches_.data());
   if (!merged_[index]) merge(b);
+  if (saves) save_positions(b);
   Particles& p = particles_;
   const auto first = static_cast<std::size_t>(b.first);
   const auto column = [&](AlignedArray<double>& a) { return a.empty() ? nullptr : a.data() + first; };
-  alignas(64) double nowhere[record_size];
   const MotionBatch batch{column(p.x), column(p.y), column(p.z), column(p.vx), column(p.vy), column(p.vz), column(p.ux),
                           column(p.uy), column(p.uz), column(p.inverse_mass), column(p.mass), column(p.radius),
                           column(p.inverse_radius), p.rows.data() + row_size * first, p.image.data() + 2 * first,
-                          b.sum.data(), keeps_sums ? nowhere : b.sum.data(), keeps_sums ? 0 : record_size, speed2_.data() + first, b.count, asks_ahead_};
+                          b.sum.data(), true, speed2_.data() + first, b.count, asks_ahead_};
   MotionTotals totals;
   kernels_.motion(batch, c, totals);
   // The places that fill up the last vector rest where they are.
@@ -275,8 +276,9 @@ void Simulation::integrate(Batch& b, const MotionConstants& c, bool keeps_sums) 
   // is left for that.
   if (!(totals.strongest < c.strongest2)) {
     b.out_of_range = b.out_of_range || !pairs_within(b, most_push_);
-    if (!keeps_sums) std::memset(b.sum.data(), 0, static_cast<std::size_t>(b.count) * record_size * sizeof(double));
+    std::memset(b.sum.data(), 0, static_cast<std::size_t>(b.count) * record_size * sizeof(double));
   }
+  if (saves) save_velocities(b);
 }
 
 // Whether pairs push every sphere of a batch with less than `most` [N]; plates and walls may push harder. Only spheres that
@@ -308,13 +310,12 @@ double Simulation::leap_of(const Batch& b, double dt) const {
   return (1.0 + 1e-9) * (b.fastest + fastest) * dt + 1e-9 * largest_radius_;
 }
 
-void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law, Sums found,
+// `cleared`: the sums of the batch's particles are zero already.
+void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law, bool cleared,
                           const StretchesOfLines* asked) {
-  const auto index = static_cast<std::size_t>(&b - batches_.data());
-  merged_[index] = 0;
-  if (found == Sums::put_aside) saved_->batches[index].sums.swap(b.sum);
-  const std::size_t cleared = found == Sums::cleared ? static_cast<std::size_t>(b.count) * record_size : 0;
-  std::memset(b.sum.data() + cleared, 0, (b.sum.size() - cleared) * sizeof(double));
+  merged_[static_cast<std::size_t>(&b - batches_.data())] = 0;
+  const std::size_t from = cleared ? static_cast<std::size_t>(b.count) * record_size : 0;
+  std::memset(b.sum.data() + from, 0, (b.sum.size() - from) * sizeof(double));
   const double leap = leap_of(b, law.dt);
   const auto nothing = static_cast<std::int32_t>(b.sum.size() * sizeof(double)) - record_bytes;
   // By the last pass, which may have had the list before a prune; none after a rebuild. Whether pairs are passed over changes no bit.
@@ -351,9 +352,8 @@ void Simulation::run_task(const Task& task) {
   const bool first = task.offset == 0;
   if (task.kind != TaskKind::contacts) integrate(b, first ? first_motion_ : motion_, first);
   if (task.kind == TaskKind::integrate) return;
-  const auto pass = [&](const StretchesOfLines* asked) {
-    contacts(b, step_ + task.offset + 1, law_, plate_law_, first ? Sums::put_aside : Sums::cleared, asked);
-  };
+  if (first) save_history(b);
+  const auto pass = [&](const StretchesOfLines* asked) { contacts(b, step_ + task.offset + 1, law_, plate_law_, true, asked); };
   if (asks_.empty() || asks_[static_cast<std::size_t>(task.number)].empty()) return pass(nullptr);
   const StretchesOfLines asked = lines_of(asks_[static_cast<std::size_t>(task.number)]);
   pass(&asked);
@@ -377,12 +377,10 @@ StretchesOfLines Simulation::lines_of(const std::vector<Asked>& asks) const {
     for (const auto* column : {&p.x, &p.y, &p.z, &p.vx, &p.vy, &p.vz, &p.ux, &p.uy, &p.uz, &p.radius, &p.inverse_radius, &p.mass, &p.inverse_mass, &speed2_})
       if (!column->empty()) add(column->data() + first, count);
     add(p.rows.data() + row_size * first, row_size * count);
-    // Those of the contacts of a run's first step on; before, its first integration meets others.
-    const auto sums = [this](std::size_t batch) { return saved_->batches[batch].sums_of_run; };
-    add(sums(static_cast<std::size_t>(a.batch)), record_size * count);
+    add(b.sum.data(), record_size * count);
     for (const Incoming& in : b.incoming) {
-      const auto owner = static_cast<std::size_t>(in.batch);
-      add(sums(owner) + record_size * static_cast<std::size_t>(batches_[owner].count + in.slot), record_size * static_cast<std::size_t>(in.count));
+      const Batch& owner = batches_[static_cast<std::size_t>(in.batch)];
+      add(owner.sum.data() + record_size * static_cast<std::size_t>(owner.count + in.slot), record_size * static_cast<std::size_t>(in.count));
     }
   }
   return lines;
@@ -394,7 +392,7 @@ void Simulation::ensure_forces() {
   if (forces_valid_) return;
   const FloatMode mode;
   law_.dt = plate_law_.dt = 0.0;
-  parallel(static_cast<int>(batches_.size()), [&](int k) { contacts(batches_[static_cast<std::size_t>(k)], step_, law_, plate_law_, Sums::old); });
+  parallel(static_cast<int>(batches_.size()), [&](int k) { contacts(batches_[static_cast<std::size_t>(k)], step_, law_, plate_law_, false); });
   collect();
   forces_valid_ = true;
   bool bad = false;
@@ -423,6 +421,8 @@ void Simulation::run_chunk(int steps) {
   motion_.mean_x = mean_[0], motion_.mean_y = mean_[1], motion_.mean_z = mean_[2];
   first_motion_ = motion_;
   first_motion_.kick = 0.5 * (last_drift_ + dt_);
+  // What is added then, -0.0 times 0.0, changes no velocity, not even one of -0.0.
+  if (kicked_) first_motion_.kick = -0.0, first_motion_.gravity = 0.0;
   const TaskBody body = [this](const Task& task) { run_task(task); };
   switch (engine_.executor) {
     case Executor::flow_graph: workers_->arena.execute([&] { run_graph(steps); }); break;
@@ -474,9 +474,9 @@ void Simulation::advance(std::int64_t steps) {
   while (steps > 0) {
     const int n = prepare_lists(std::min<std::int64_t>(steps, one_by_one ? 1 : at_most));
     prepare_graph();
-    save();  // last, so that nothing is lost where memory runs out
+    make_room_to_save();  // last, so that nothing is lost where memory runs out
     run_chunk(n);
-    bool bad = false;
+    bool bad = kicked_out_of_range_;
     for (const Batch& b : batches_) bad = bad || b.out_of_range;
     // Did the lists hold? If not, a pair may have been missed, and a force out of range may be its consequence: from the
     // saved state once more with wider lists. Lists change no bits, so nobody sees it.
@@ -507,6 +507,7 @@ void Simulation::advance(std::int64_t steps) {
       fail("forces or velocities out of range");
     }
     collect();
+    kicked_ = false;
     step_ += n;
     steps -= n;
     last_drift_ = dt_;

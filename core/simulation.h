@@ -162,10 +162,9 @@ class Simulation {
   void setup_particles(const SphereTable& spheres);
   void setup_laws(const SimulationSetup& setup);
   void merge(Batch& batch);
-  void integrate(Batch& batch, const MotionConstants& c, bool keeps_sums);
+  void integrate(Batch& batch, const MotionConstants& c, bool saves);
   bool pairs_within(const Batch& batch, double most) const;
-  enum class Sums { old, put_aside, cleared };  // what a pass over the contacts finds
-  void contacts(Batch& batch, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law, Sums found,
+  void contacts(Batch& batch, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law, bool cleared,
                 const StretchesOfLines* asked = nullptr);
   void run_task(const Task& task);
   void collect();
@@ -198,7 +197,10 @@ class Simulation {
   bool keeps_k_t() const {  // kernels for other exponents remember k_t
     return built_scenes[static_cast<std::size_t>(kernels_.scene)].traits.exponent != Exponent::one;
   }
-  void save();
+  void make_room_to_save();
+  void save_positions(const Batch& batch);
+  void save_velocities(const Batch& batch);
+  void save_history(Batch& batch);
   void restore();
   void mean_velocity();
   void parallel(int count, const std::function<void(int)>& body);
@@ -269,6 +271,8 @@ class Simulation {
   struct Workers;
   std::unique_ptr<Workers> workers_;
   std::unique_ptr<Saved> saved_;
+  bool kicked_ = false;  // after going back: velocities are those of the half step to come, sums are zero
+  bool kicked_out_of_range_ = false;
   MotionConstants first_motion_{};
   std::vector<char> merged_;
   EngineCounters counters_;

@@ -14,16 +14,17 @@ struct Simulation::Workers {
   tbb::task_arena arena;
 };
 
-// Everything that a run of steps changes, for going back. Rows and sums are written anew in every step, so those of the
-// step before the run are not copied: they are put aside, and the run writes into the arrays that were here.
+// What a run of steps goes back to: not to where it began, but behind its first kick. There forces have done what they were found
+// for, so that none need be kept; the first step once more is a drift. Tasks of the first step save what is theirs while it is at hand.
 struct Simulation::Saved {
-  AlignedArray<double> rows;
+  AlignedArray<double> x, y, z;                          // before the first step
+  AlignedArray<double> vx, vy, vz, ux, uy, uz;           // after its kick
   AlignedArray<std::int32_t> image;
   struct OfBatch {
-    AlignedArray<double> history;    // copies: contacts read and write them in place
-    AlignedArray<double> sums;       // put aside by the first pass over the contacts
-    const double* sums_of_run = nullptr;  // where the run will have its own: tasks of other batches may not look into arrays that are swapped
+    AlignedArray<double> history;
     std::int64_t contacts = 0;
+    std::int64_t rolling = 0;    // of the kick: dissipated once, however often it is gone on from there [quanta]
+    bool out_of_range = false;   // found in the kick
   };
   std::vector<OfBatch> batches;
 };

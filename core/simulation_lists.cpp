@@ -437,45 +437,70 @@ void Simulation::open_sides() {
   forces_valid_ = false;
 }
 
-void Simulation::save() {
+void Simulation::make_room_to_save() {
   Saved& s = *saved_;
-  s.rows.resize(particles_.rows.size());
+  for (auto* column : {&s.x, &s.y, &s.z, &s.vx, &s.vy, &s.vz, &s.ux, &s.uy, &s.uz}) column->resize(particles_.x.size());
   s.image.resize(particles_.image.size());
   s.batches.resize(batches_.size());
-  merge_all();
   parallel(static_cast<int>(batches_.size()), [&](int k) {
-    Batch& b = batches_[static_cast<std::size_t>(k)];
-    const auto first = 2 * static_cast<std::size_t>(b.first), count = 2 * static_cast<std::size_t>(b.count);
-    std::copy_n(particles_.image.data() + first, count, s.image.data() + first);
-    Saved::OfBatch& to = s.batches[static_cast<std::size_t>(k)];
-    for_each_history(b, [&](std::size_t size) { to.history.resize(size); },
-                     [&](double* data, std::size_t size, std::size_t at) { std::copy_n(data, size, to.history.data() + at); });
-    to.sums.resize(b.sum.size());
-    to.sums_of_run = to.sums.data();
-    to.contacts = b.pair_totals.contacts;
+    for_each_history(batches_[static_cast<std::size_t>(k)], [&](std::size_t size) { s.batches[static_cast<std::size_t>(k)].history.resize(size); },
+                     [](double*, std::size_t, std::size_t) {});
   });
-  s.rows.swap(particles_.rows);  // last, so that nothing is lost where memory runs out
+}
+
+namespace {
+// Copies the batch's part of a column.
+void copy_part(const Batch& b, const AlignedArray<double>& from, AlignedArray<double>& to) {
+  std::copy_n(from.data() + b.first, b.count, to.data() + b.first);
+}
+}  // namespace
+
+void Simulation::save_positions(const Batch& b) {
+  Saved& s = *saved_;
+  const Particles& p = particles_;
+  copy_part(b, p.x, s.x), copy_part(b, p.y, s.y), copy_part(b, p.z, s.z);
+  std::copy_n(p.image.data() + 2 * b.first, 2 * b.count, s.image.data() + 2 * b.first);
+}
+
+void Simulation::save_velocities(const Batch& b) {
+  Saved& s = *saved_;
+  const Particles& p = particles_;
+  copy_part(b, p.vx, s.vx), copy_part(b, p.vy, s.vy), copy_part(b, p.vz, s.vz);
+  copy_part(b, p.ux, s.ux), copy_part(b, p.uy, s.uy), copy_part(b, p.uz, s.uz);
+  Saved::OfBatch& to = s.batches[static_cast<std::size_t>(&b - batches_.data())];
+  to.rolling = b.rolling, to.out_of_range = b.out_of_range;
+}
+
+void Simulation::save_history(Batch& b) {
+  Saved::OfBatch& to = saved_->batches[static_cast<std::size_t>(&b - batches_.data())];
+  for_each_history(b, [](std::size_t) {}, [&](double* data, std::size_t size, std::size_t at) { std::copy_n(data, size, to.history.data() + at); });
+  to.contacts = b.pair_totals.contacts;
 }
 
 void Simulation::restore() {
   Saved& s = *saved_;
-  s.rows.swap(particles_.rows);
-  particles_.read_rows();
-  std::copy_n(s.image.data(), s.image.size(), particles_.image.data());
+  Particles& p = particles_;
+  p.x.swap(s.x), p.y.swap(s.y), p.z.swap(s.z);
+  p.vx.swap(s.vx), p.vy.swap(s.vy), p.vz.swap(s.vz);
+  p.ux.swap(s.ux), p.uy.swap(s.uy), p.uz.swap(s.uz);
+  p.image.swap(s.image);
+  p.write_rows(on_workers());
   for (std::size_t k = 0; k < batches_.size(); ++k) {
     Batch& b = batches_[k];
-    Saved::OfBatch& from = s.batches[k];
+    const Saved::OfBatch& from = s.batches[k];
     for_each_history(b, [](std::size_t) {},
                      [&](double* data, std::size_t size, std::size_t at) { std::copy_n(from.history.data() + at, size, data); });
-    from.sums.swap(b.sum);
+    std::fill(b.sum.begin(), b.sum.end(), 0.0);
     merged_[k] = 1;
-    const auto contacts = from.contacts;
     b.pair_totals = {};
-    b.pair_totals.contacts = contacts;
+    b.pair_totals.contacts = from.contacts;
     std::fill(std::begin(b.plate_energy), std::end(b.plate_energy), 0);
     b.plate_work = b.rolling = 0;
     b.out_of_range = false;
+    rolling_ += from.rolling;
+    kicked_out_of_range_ = kicked_out_of_range_ || from.out_of_range;
   }
+  kicked_ = true;
 }
 
 }  // namespace platen

@@ -35,15 +35,15 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
       records[lane] = I::load_record(b.sum + record_size * static_cast<std::int64_t>(k + lane));
     Real f[8];
     I::from_records(records, f);
-    bool clear = true;
+    bool clears = b.clears;
     if constexpr (guarded) {
       const Real push2 = I::fma(f[2], f[2], I::fma(f[1], f[1], f[0] * f[0]));
       strongest = I::max(strongest, push2);
-      clear = !I::any(I::not_less(push2, I::set(c.strongest2)));
+      clears = clears && !I::any(I::not_less(push2, I::set(c.strongest2)));
     }
     // While they are here, instead of by a pass of its own.
-    if (clear)
-      for (int lane = 0; lane < I::width; ++lane) I::store_record(b.cleared + b.cleared_step * (k + lane), I::zero_record());
+    if (clears)
+      for (int lane = 0; lane < I::width; ++lane) I::store_record(b.sum + record_size * static_cast<std::int64_t>(k + lane), I::zero_record());
     Real inverse_m, m, R, inverse_R;
     if constexpr (equal_spheres) {
       inverse_m = I::set(c.inverse_mass), m = I::set(c.mass), R = I::set(c.radius), inverse_R = I::set(c.inverse_radius);

@@ -220,9 +220,8 @@ struct MotionBatch {
   const double *inverse_mass, *mass, *radius, *inverse_radius;  // null where spheres are equal
   double* rows;            // of this batch's first particle
   std::int32_t* image;     // 2 per particle
-  const double* sum;       // records: the forces
-  double* cleared;         // records that are set to zero behind the particles: those of `sum`, or one other
-  std::int64_t cleared_step;    // from one to the next, in doubles; 0 where it is one other
+  double* sum;             // records: the forces
+  bool clears;             // sets them to zero
   double* speed2;          // of each particle: |v - mean|^2 is added [m2/s2]
   std::int32_t count;      // multiple of padding
   bool asks;               // for spheres ahead, where a near cache does not hold the bed
