@@ -324,7 +324,7 @@ void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, 
                   b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum.data(), b.first, b.padded, b.first + b.count, nothing, dense, leap,
                   particles_.x.data(), particles_.y.data(), particles_.z.data(), particles_.vx.data(),
                   particles_.vy.data(), particles_.vz.data(), particles_.ux.data(), particles_.uy.data(),
-                  particles_.uz.data(), dense && asks_ahead_ ? b.ahead : 0, particles_.padded, asks_history_, nullptr, 0, 0};
+                  particles_.uz.data(), dense && asks_for_partners() ? b.ahead : 0, particles_.padded, asks_history_, nullptr, 0, 0};
   if (asked != nullptr) asked->put_into(pairs);
   b.pair_totals.contacts = 0;
   kernels_.contacts(pairs, law, b.pair_totals);
@@ -424,12 +424,24 @@ void Simulation::run_chunk(int steps) {
   // What is added then, -0.0 times 0.0, changes no velocity, not even one of -0.0.
   if (kicked_) first_motion_.kick = -0.0, first_motion_.gravity = 0.0;
   const TaskBody body = [this](const Task& task) { run_task(task); };
+  ++counters_.runs;
+  if (asks_for_partners()) ++counters_.runs_asking;
+  const auto start = std::chrono::steady_clock::now();
   switch (engine_.executor) {
     case Executor::flow_graph: workers_->arena.execute([&] { run_graph(steps); }); break;
     case Executor::plain_threads: run_on_plain_threads(*table_, steps, body, engine_.threads); break;
     default: run_serially(*table_, steps, body); break;
   }
+  if (4 * steps < unroll_) return;  // most of the time would be that of beginning
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / steps;
+  if (takers_are_tried_) taking_.took(seconds);
+  if (asks_are_tried()) asking_.took(seconds);
 }
+
+// A bed that the third cache holds is quicker without asking where that cache is its own, and much slower where others crowd it out.
+bool Simulation::asks_are_tried() const { return asks_ahead_ && !asks_history_ && !takers_are_tried_; }
+
+bool Simulation::asks_for_partners() const { return asks_ahead_ && !(asks_are_tried() && asking_.way() == 1); }
 
 void Simulation::prepare_table() {
   table_ = std::make_unique<TaskTable>(batches_, unroll_, engine_.fused);
@@ -447,7 +459,7 @@ void Simulation::prepare_table() {
 // Who takes the tasks of the next run. A bed in the caches: threads that keep their part of it are the fastest where each has a core to
 // itself, and the slowest where something else holds one of them up.
 Takers Simulation::takers() const {
-  if (takers_are_tried_) return static_cast<Takers>(quicker_.way());
+  if (takers_are_tried_) return static_cast<Takers>(taking_.way());
   return table_->worker().empty() ? Takers::anybody : Takers::workers;
 }
 
@@ -459,10 +471,7 @@ void Simulation::prepare_graph() {
 
 void Simulation::run_graph(int steps) {
   const Takers by = takers();
-  const auto start = std::chrono::steady_clock::now();
   graphs_[static_cast<std::size_t>(by)]->run(steps);
-  // Of much shorter runs most of the time would be the graph's.
-  if (takers_are_tried_ && 4 * steps >= unroll_) quicker_.took(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / steps);
   if (by == Takers::workers) ++counters_.runs_by_workers;
 }
 

@@ -79,6 +79,7 @@ struct SimulationState;  // core/simulation_state.h
 struct EngineCounters {
   std::int64_t rebuilds = 0, prunes = 0, redone_steps = 0;
   std::int64_t spared_steps = 0;  // not done again although spheres went beyond their margins
+  std::int64_t runs = 0, runs_asking = 0;  // of steps; those in which partners were asked for ahead [kernels/ask_ahead.h]
   std::int64_t runs_by_workers = 0;  // of steps, in which threads kept their parts of the bed [core/flow_graph.h]
   int batches = 0;
   double skin = 0.0, gap = 0.0;  // of the lists, means over the spheres [m]
@@ -210,6 +211,8 @@ class Simulation {
   [[noreturn]] void fail(const std::string& what);
   void prepare_table();
   Takers takers() const;
+  bool asks_are_tried() const;
+  bool asks_for_partners() const;
   void prepare_graph();
   void run_graph(int steps);
   void add_pair_energy(FixedSum& sum) const;
@@ -267,7 +270,8 @@ class Simulation {
   std::unique_ptr<TaskTable> table_;
   std::unique_ptr<FlowGraph> graphs_[2];  // by Takers; made when needed
   bool takers_are_tried_ = false;         // there is a choice
-  Quicker quicker_;
+  Quicker taking_;                        // by Takers
+  Quicker asking_;                        // 0 asks for partners, 1 does not
   struct Workers;
   std::unique_ptr<Workers> workers_;
   std::unique_ptr<Saved> saved_;

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <functional>
 
+#include "core/cache_model.h"
 #include "tests/scenes.h"
 
 namespace platen {
@@ -140,6 +141,25 @@ TEST(Determinism, WhoeverTakesTheTasks) {
       EXPECT_GE(r.counters.runs_by_workers, Quicker::runs_of_block);
       EXPECT_LE(r.counters.runs_by_workers, bed_steps / engine.unroll - Quicker::runs_of_block);
     }
+}
+
+// With and without asking ahead, one after the other: a bed that two caches hold and half a cache does not.
+TEST(Determinism, AskingOrNot) {
+  EngineOptions engine;
+  engine.unroll = 4;
+  static_assert(bed_steps > 4 * Quicker::runs_of_block * Quicker::blocks_of_trial);
+  Simulation sim(pressed_bed({}));
+  sim.set_time_step(1e-5);
+  sim.rebuild_now();
+  const double bytes = touched_bytes(sim.batches());
+  for (const double caches : {0.25, 1.0, 4.0}) {
+    engine.cache = bytes / caches;
+    const Outcome r = run(pressed_bed(engine), bed_steps);
+    expect_same(r, reference(), std::to_string(caches) + " caches");
+    const std::int64_t asking = r.counters.runs_asking, all = r.counters.runs, tried = Quicker::runs_of_block;
+    EXPECT_GE(asking, caches == 4.0 ? all : caches == 1.0 ? tried : 0) << caches << " caches";
+    EXPECT_LE(asking, caches == 4.0 ? all : caches == 1.0 ? all - tried : 0) << caches << " caches";
+  }
 }
 
 TEST(Determinism, SkinsAndGaps) {
