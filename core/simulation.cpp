@@ -19,6 +19,11 @@
 
 namespace platen {
 
+namespace {
+// By the last pass, which may have had the list before a prune; none after a rebuild. Whether pairs are passed over changes no bit.
+bool is_dense(const Batch& b) { return 4 * b.pair_totals.contacts > 3 * std::int64_t{b.padded}; }
+}  // namespace
+
 Simulation::Workers::Workers(int threads)
     : control(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads)), arena(threads) {}
 
@@ -318,8 +323,7 @@ void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, 
   std::memset(b.sum.data() + from, 0, (b.sum.size() - from) * sizeof(double));
   const double leap = leap_of(b, law.dt);
   const auto nothing = static_cast<std::int32_t>(b.sum.size() * sizeof(double)) - record_bytes;
-  // By the last pass, which may have had the list before a prune; none after a rebuild. Whether pairs are passed over changes no bit.
-  const bool dense = 4 * b.pair_totals.contacts > 3 * std::int64_t{b.padded};
+  const bool dense = is_dense(b);
   PairBatch pairs{particles_.rows.data(), b.i.data(), b.row_j.data(), b.to.data(), b.owners_of_eight.data(), b.sp.data(), b.tx.data(),
                   b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum.data(), b.first, b.padded, b.first + b.count, nothing, dense, leap,
                   particles_.x.data(), particles_.y.data(), particles_.z.data(), particles_.vx.data(),
@@ -435,10 +439,12 @@ void Simulation::run_chunk(int steps) {
   if (4 * steps < unroll_) return;  // most of the time would be that of beginning
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / steps;
   if (takers_are_tried_) taking_.took(seconds);
-  if (asks_are_tried()) asking_.took(seconds);
+  // Only dense lists ask: in other runs both ways are the same.
+  if (asks_are_tried() && std::any_of(batches_.begin(), batches_.end(), is_dense)) asking_.took(seconds);
 }
 
 // A bed that the third cache holds is quicker without asking where that cache is its own, and much slower where others crowd it out.
+// Not together with the takers: each trial would see what the other changes.
 bool Simulation::asks_are_tried() const { return asks_ahead_ && !asks_history_ && !takers_are_tried_; }
 
 bool Simulation::asks_for_partners() const { return asks_ahead_ && !(asks_are_tried() && asking_.way() == 1); }
@@ -483,7 +489,7 @@ void Simulation::advance(std::int64_t steps) {
   while (steps > 0) {
     const int n = prepare_lists(std::min<std::int64_t>(steps, one_by_one ? 1 : at_most));
     prepare_graph();
-    make_room_to_save();  // last, so that nothing is lost where memory runs out
+    make_room_to_save();  // for the lists as they are now
     run_chunk(n);
     bool bad = kicked_out_of_range_;
     for (const Batch& b : batches_) bad = bad || b.out_of_range;

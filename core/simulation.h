@@ -31,7 +31,8 @@
 
 namespace platen {
 
-// A run that cannot go on: not a number, overlap above R, force out of range, lost particle. Names step, ids, positions.
+// A run that cannot go on: not a number, overlap above R, force out of range, lost particle. Names step, ids, positions. Of the Simulation
+// that threw it only step(), time() and counters() mean anything from then on.
 class RunError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -60,7 +61,7 @@ struct EngineOptions {
   InstructionSet instruction_set = InstructionSet::scalar;
   Executor executor = Executor::automatic;
   bool fused = false;       // one task per batch and step instead of two
-  double cache = ordered_cache;  // that the order of tasks counts on in larger beds; a worker whose part is above half of it asks ahead [bytes]
+  double cache = ordered_cache;  // that the order of tasks counts on in larger beds; a worker whose part is above half of it asks ahead, up to twice as much if that is quicker [bytes]
   std::function<void(TaskTable&)> tamper;  // for tests: changes every table of tasks before it is used
 };
 

@@ -18,7 +18,8 @@
 namespace platen {
 
 enum class TaskKind : std::uint8_t {
-  integrate,  // reads sums of b, halo slots meant for b, plate forces of b; writes x v u of b and its largest speed
+  integrate,  // reads sums of b, halo slots meant for b, plate forces of b; writes x v u of b and its largest speed. Of a run's first step it
+              // saves x v u, and contacts the history, in places of b alone
   contacts,   // reads x v u of b and its partners; writes history, sums and halo slots of b
   step        // fused: integrate, then contacts
 };

@@ -107,7 +107,7 @@ struct PairBatch {
   bool dense;           // most touched in the pass before: none is looked for that could be left out, which changes no bit
   double leap;          // bound of the change of any pair's distance in the last step [m]
   const double *x, *y, *z, *vx, *vy, *vz, *ux, *uy, *uz;  // the state itself, for the owner side
-  std::int32_t ahead;    // partners are asked for so many places ahead of their owners; 0 where a near cache holds the bed, or few touch
+  std::int32_t ahead;    // partners are asked for so many places ahead of their owners; 0 where a near cache holds the bed, few touch, or not asking is quicker
   std::int32_t spheres;  // that have rows
   bool asks_history;     // of contacts as well, where no cache holds the bed
   const AskedLines* lines;  // for others [core/task_asks.h], so many of them with each chunk

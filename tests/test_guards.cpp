@@ -40,7 +40,7 @@ std::string said_after(InstructionSet set, int threads, const Fault& fault, cons
   std::int32_t k = 0;  // the sphere of id 10 + 3 * 21, in the middle of the bed
   while (state.id_of_rank[static_cast<std::size_t>(state.rank[static_cast<std::size_t>(k)])] != 73) ++k;
   fault(const_cast<Particles&>(state), const_cast<std::vector<Batch>&>(sim.batches()), static_cast<std::size_t>(k));
-  const_cast<Particles&>(state).write_rows();  // they are what a run goes back to
+  const_cast<Particles&>(state).write_rows();
   return said_by(sim, 32);
 }
 
@@ -170,7 +170,7 @@ TEST(Guards, AnImpactThatNoSphereSurvives) {
     Simulation sim(setup);
     sim.set_time_step(1e-9);
     const std::string said = said_by(sim, 4);
-    EXPECT_NE(said.find("out of range at step "), std::string::npos) << to_string(set) << said;
+    EXPECT_NE(said.find("out of range at step 1 "), std::string::npos) << to_string(set) << said;
   }
 }
 
