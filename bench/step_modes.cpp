@@ -9,6 +9,7 @@
 #include "bench/parallel_for_step.h"
 #include "bench/reference_loops.h"
 #include "bench/scalar_step.h"
+#include "core/huge_pool.h"
 
 namespace platen::bench {
 
@@ -103,6 +104,7 @@ void table_of_steps(const StepOptions& o) {
       for (const InstructionSet set : sets_of(o))
         for (const int threads : either(o.threads, {1, 2})) {
           const BenchScene scene = bench_scene(name);
+          trim_pool();  // what the benches before have left there would serve this one, and not be counted
           const double before = resident_bytes();
           const auto sim = make_simulation(bed, scene, engine_of(o, set, threads));
           sim->advance(o.warm);

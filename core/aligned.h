@@ -52,29 +52,13 @@ class AlignedArray {
     std::fill(data_, data_ + size, value);
     size_ = size;
   }
+  // The same for what lists hold: in memory of that size, not in what a longer list has left.
+  void renew(std::size_t size, T value) {
+    if (capacity_ > size + size / 8 + 64) *this = AlignedArray();
+    assign(size, value);
+  }
   void reserve(std::size_t capacity) {
-    if (capacity <= capacity_) return;
-    capacity = std::max(capacity, capacity_ + capacity_ / 4);
-    const std::size_t bytes = capacity * sizeof(T);
-    const bool large = bytes >= largest_pooled, pooled = pools && !large && bytes >= smallest_pooled;
-    void* block = nullptr;
-    std::size_t stagger = 0;
-    std::size_t of_pool = 0;
-    if (pooled) {
-      const PoolBlock from_pool = take_from_pool(bytes);
-      block = from_pool.memory, of_pool = from_pool.bytes, capacity = of_pool / sizeof(T);
-    } else {
-      const std::size_t alignment = large ? huge_page : 64;
-      stagger = large ? 64 * (next_start() % 61) : 0;
-      const std::size_t whole = (bytes + stagger + alignment - 1) / alignment * alignment;
-      block = std::aligned_alloc(alignment, whole);
-      if (block == nullptr) throw std::bad_alloc();
-      if (large) madvise(block, whole, MADV_HUGEPAGE);  // a wish: without huge pages everything still works
-    }
-    T* data = reinterpret_cast<T*>(static_cast<char*>(block) + stagger);
-    std::copy(data_, data_ + size_, data);
-    release();
-    block_ = block, data_ = data, capacity_ = capacity, pooled_ = of_pool;
+    if (capacity > capacity_) grow(capacity);
   }
 
   T* data() { return data_; }
@@ -93,6 +77,29 @@ class AlignedArray {
   // An array of its own takes whole huge pages: half a page too much on average, which is little from eight pages on.
   static constexpr std::size_t huge_page = std::size_t{1} << 21, smallest_pooled = 2048;
   static_assert(largest_pooled == 8 * huge_page);
+  void grow(std::size_t capacity) {
+    const std::size_t bytes = capacity * sizeof(T);
+    const bool large = bytes >= largest_pooled, pooled = pools && !large && bytes >= smallest_pooled;
+    void* block = nullptr;
+    std::size_t stagger = 0;
+    std::size_t of_pool = 0;
+    if (pooled) {
+      const PoolBlock from_pool = take_from_pool(bytes);
+      block = from_pool.memory, of_pool = from_pool.bytes, capacity = of_pool / sizeof(T);
+    } else {
+      const std::size_t alignment = large ? huge_page : 64;
+      stagger = large ? 64 * (next_start() % 61) : 0;
+      const std::size_t whole = (bytes + stagger + alignment - 1) / alignment * alignment;
+      block = std::aligned_alloc(alignment, whole);
+      if (block == nullptr) throw std::bad_alloc();
+      if (large) madvise(block, whole, MADV_HUGEPAGE);  // a wish: without huge pages everything still works
+      capacity = (whole - stagger) / sizeof(T);
+    }
+    T* data = reinterpret_cast<T*>(static_cast<char*>(block) + stagger);
+    std::copy(data_, data_ + size_, data);
+    release();
+    block_ = block, data_ = data, capacity_ = capacity, pooled_ = of_pool;
+  }
   void release() {
     if (pooled_ > 0)
       give_to_pool({block_, pooled_});

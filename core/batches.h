@@ -2,7 +2,7 @@
 //
 //   particles   ... | first ............ first+count | ...      whole vectors
 //   outer list  pairs of own particles within R_i + R_j + margins, by owner; lives from rebuild to rebuild
-//   inner list  those of them within smaller margins, with the history; all that the contact kernel sees
+//   inner list  those of them within smaller margins, in the same order, with the history; all that the contact kernel sees
 //   sums        [ own particles | halo slots | zero ]    halo slot: one per foreign partner, written by this batch only,
 //                                                         read by the partner's batch through `incoming`
 //
@@ -38,12 +38,12 @@ struct Batch {
   double centre[3] = {0, 0, 0};       // of its spheres when the lists were made [m]
 
   PooledVector<std::int32_t> outer_i, outer_j;
+  AlignedArray<std::uint64_t> listed;  // a bit for each outer pair: set where it is in the inner list
 
   std::int32_t used = 0, padded = 0;  // pairs of the inner list
   AlignedArray<std::int32_t> i, row_j;  // kernels/views.h
   AlignedArray<PairTargets> to;
   AlignedArray<OwnersOfEight> owners_of_eight;  // one for each eight pairs
-  AlignedArray<std::int32_t> from;      // place in the outer list
   std::int32_t j(std::size_t k) const { return row_j[k] / row_size; }
   AlignedArray<double> sp, tx, ty, tz, k_t_last;
   std::int32_t ahead = 0;               // PairBatch::ahead, if it is asked for

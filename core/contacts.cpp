@@ -1,6 +1,7 @@
 #include "core/contacts.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -16,9 +17,15 @@ bool has_history(const Batch& b, std::size_t k) {
   return b.sp[k] != 0.0 || b.tx[k] != 0.0 || b.ty[k] != 0.0 || b.tz[k] != 0.0 || (!b.k_t_last.empty() && b.k_t_last[k] != 0.0);
 }
 
+template <class Visit>
+void for_each_bit(std::uint64_t bits, const Visit& visit) {
+  for (; bits != 0; bits &= bits - 1) visit(std::countr_zero(bits));
+}
+
 // New inner list of one batch in the making; the same memory for every batch that a thread works on.
 struct Inner {
   std::vector<std::int32_t> from;                          // places in the outer list, ascending
+  AlignedArray<std::uint64_t> listed;                      // Batch::listed
   AlignedArray<double> sp, tx, ty, tz, k_t;                // signed from owner to partner
   std::vector<std::int32_t> slot_of;                       // of foreign particles; -1 where none
   std::vector<std::int32_t> distances;                     // along the curve, of a sample of contacts
@@ -27,18 +34,20 @@ struct Inner {
   template <class Close>
   void choose(const Batch& batch, const Close& close) {
     const std::size_t outer = batch.outer_j.size();
-    from.resize(outer);
-    std::size_t kept = 0;
-    for (std::size_t m = 0; m < outer; ++m) {  // without a branch, which no processor could foresee
-      from[kept] = static_cast<std::int32_t>(m);
-      kept += close(batch.outer_i[m], batch.outer_j[m]) ? 1u : 0u;
+    listed.renew((outer + 63) / 64, 0);
+    from.clear();
+    for (std::size_t first = 0; first < outer; first += 64) {
+      std::uint64_t chosen = 0;
+      for (std::size_t m = first; m < std::min(first + 64, outer); ++m)  // without a branch, which no processor could foresee
+        chosen |= std::uint64_t{close(batch.outer_i[m], batch.outer_j[m])} << (m - first);
+      listed[first / 64] = chosen;
+      for_each_bit(chosen, [&](int bit) { from.push_back(static_cast<std::int32_t>(first) + bit); });
     }
-    from.resize(kept);
   }
   std::size_t padded() const { return (from.size() + pair_padding - 1) / pair_padding * pair_padding; }
   void clear_history(bool with_k_t) {
-    for (auto* column : {&sp, &tx, &ty, &tz}) column->assign(padded(), 0.0);
-    k_t.assign(with_k_t ? padded() : 0, 0.0);
+    for (auto* column : {&sp, &tx, &ty, &tz}) column->renew(padded(), 0.0);
+    k_t.renew(with_k_t ? padded() : 0, 0.0);
   }
 };
 
@@ -64,17 +73,17 @@ void install(Batch& batch, Inner& inner, const Particles& p) {
   batch.used = static_cast<std::int32_t>(inner.from.size());
   batch.padded = static_cast<std::int32_t>(inner.padded());
   const auto size = inner.padded();
-  for (auto* column : {&batch.i, &batch.row_j, &batch.from}) column->assign(size, 0);
-  batch.to.assign(size, {});
+  for (auto* column : {&batch.i, &batch.row_j}) column->renew(size, 0);
+  batch.to.renew(size, {});
   batch.sp.swap(inner.sp), batch.tx.swap(inner.tx), batch.ty.swap(inner.ty), batch.tz.swap(inner.tz);
   batch.k_t_last.swap(inner.k_t);
+  batch.listed.swap(inner.listed);
 
   inner.slot_of.resize(static_cast<std::size_t>(p.padded), -1);
   batch.halo.clear();
   for (std::size_t k = 0; k < inner.from.size(); ++k) {
     const auto m = static_cast<std::size_t>(inner.from[k]);
     const std::int32_t j = batch.outer_j[m], local = j - batch.first;
-    batch.from[k] = inner.from[k];
     batch.i[k] = batch.outer_i[m];
     batch.row_j[k] = row_size * j;
     batch.to[k].partner = record_bytes * local;
@@ -92,13 +101,13 @@ void install(Batch& batch, Inner& inner, const Particles& p) {
     batch.i[k] = batch.used > 0 ? batch.i[static_cast<std::size_t>(batch.used) - 1] : batch.first;
     batch.row_j[k] = row_size * batch.i[k];
     batch.to[k].partner = record_bytes * (batch.i[k] - batch.first);
-    batch.from[k] = -1;
   }
   const std::size_t own = static_cast<std::size_t>(batch.count) * record_size;
   const std::size_t nothing = own + batch.halo.size() * record_size;
   find_owner_runs(batch.i.data(), batch.padded, batch.first, batch.to.data());
-  batch.owners_of_eight.assign(size / 8, {});
+  batch.owners_of_eight.renew(size / 8, {});
   find_owners(batch.i.data(), batch.padded, batch.first, batch.first + batch.count, batch.owners_of_eight.data());
+  batch.sum.reserve(nothing + record_size);
   batch.sum.resize(own);
   batch.sum.resize(nothing + record_size);
   batch.ahead = usual_distance(batch, inner.distances);
@@ -194,15 +203,20 @@ void prune(std::vector<Batch>& batches, const Particles& p, const Domain& domain
     Inner& inner = inner_of_this_thread();
     inner.choose(b, close);
     inner.clear_history(with_k_t);
-    std::size_t to = 0;
-    for (std::size_t old = 0; old < static_cast<std::size_t>(b.used); ++old) {
-      while (to < inner.from.size() && inner.from[to] < b.from[old]) ++to;
-      if (to < inner.from.size() && inner.from[to] == b.from[old]) {
+    // Both lists have the order of the outer one.
+    std::size_t old_first = 0, first = 0;
+    for (std::size_t word = 0; word < b.listed.size(); ++word) {
+      const std::uint64_t old_bits = b.listed[word], bits = inner.listed[word];
+      const auto place = [](std::uint64_t of, int bit) { return static_cast<std::size_t>(std::popcount(of & ((std::uint64_t{1} << bit) - 1))); };
+      for_each_bit(old_bits & bits, [&](int bit) {
+        const std::size_t old = old_first + place(old_bits, bit), to = first + place(bits, bit);
         inner.sp[to] = b.sp[old], inner.tx[to] = b.tx[old], inner.ty[to] = b.ty[old], inner.tz[to] = b.tz[old];
         if (with_k_t) inner.k_t[to] = b.k_t_last[old];
-      } else if (has_history(b, old)) {
-        lost(p, b.i[old], b.j(old));
-      }
+      });
+      for_each_bit(old_bits & ~bits, [&](int bit) {
+        if (const std::size_t old = old_first + place(old_bits, bit); has_history(b, old)) lost(p, b.i[old], b.j(old));
+      });
+      old_first += static_cast<std::size_t>(std::popcount(old_bits)), first += static_cast<std::size_t>(std::popcount(bits));
     }
     install(b, inner, p);
   });

@@ -3,11 +3,14 @@
 #include <sys/mman.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdlib>
+#include <iterator>
 #include <map>
 #include <mutex>
 #include <new>
-#include <vector>
+#include <set>
+#include <utility>
 
 namespace platen {
 
@@ -15,58 +18,95 @@ namespace {
 
 constexpr std::size_t huge_page = std::size_t{1} << 21, largest_slab = std::size_t{1} << 25;
 
+// Free blocks by place, to be joined with free neighbours, and by size: the smallest that will do is taken, and what is
+// left of it stays free. Lists of a rebuild are never exactly as long as those before.
 class HugePool {
  public:
   PoolBlock take(std::size_t bytes) {
-    const std::size_t size = size_class(bytes);
+    const std::size_t size = whole(bytes);
     const std::lock_guard lock(mutex_);
-    // Lists of the next rebuild are a little longer or shorter than those before: a block half as large again will do.
-    for (auto of_size = free_.lower_bound(size); of_size != free_.end() && of_size->first <= size + size / 2; ++of_size) {
-      std::vector<void*>& free = of_size->second.free;
-      if (free.empty()) continue;
-      const PoolBlock block{free.back(), of_size->first};
-      free.pop_back();
-      return block;
+    auto found = by_size_.lower_bound({size, nullptr});
+    if (found == by_size_.end()) {
+      add_slab(size);
+      found = by_size_.lower_bound({size, nullptr});
     }
-    Class& of_size = free_[size];
-    // Room for every block of this size, so that giving one back never asks for memory.
-    if (of_size.free.capacity() <= of_size.blocks) of_size.free.reserve(2 * of_size.blocks + 1);
-    if (left_ < size) {  // the rest of the old slab stays unused: less than one block
-      const std::size_t slab = std::max(next_slab_, (size + huge_page - 1) / huge_page * huge_page);
-      void* memory = std::aligned_alloc(huge_page, slab);
-      if (memory == nullptr) throw std::bad_alloc();
-      madvise(memory, slab, MADV_HUGEPAGE);  // a wish: without huge pages everything still works
-      at_ = static_cast<char*>(memory), left_ = slab;
-      next_slab_ = std::min(2 * next_slab_, largest_slab);
-    }
-    char* block = at_;
-    at_ += size, left_ -= size, ++of_size.blocks;
-    return {block, size};
+    const auto [free, at] = *found;
+    if (free > size) add_free(at + size, free - size);  // first: it may find no memory to note it in
+    by_size_.erase({free, at});
+    by_place_.erase(at);
+    in_use_ += size;
+    return {at, size};
   }
   void give(const PoolBlock& block) noexcept {
     const std::lock_guard lock(mutex_);
-    free_.find(block.bytes)->second.free.push_back(block.memory);
+    char* at = static_cast<char*>(block.memory);
+    std::size_t size = block.bytes;
+    in_use_ -= size;
+    auto next = by_place_.lower_bound(at);
+    if (next != by_place_.end() && next->first == at + size) {
+      size += next->second;
+      next = forget(next);
+    }
+    if (next != by_place_.begin()) {
+      const auto before = std::prev(next);
+      if (before->first + before->second == at) {
+        at = before->first, size += before->second;
+        forget(before);
+      }
+    }
+    try {
+      add_free(at, size);
+    } catch (const std::bad_alloc&) {  // no memory for a note of it: this block serves nobody any more
+    }
+  }
+  void trim() noexcept {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [at, size] : by_place_) {
+      const auto begin = (reinterpret_cast<std::uintptr_t>(at) + huge_page - 1) / huge_page * huge_page;
+      const auto end = (reinterpret_cast<std::uintptr_t>(at) + size) / huge_page * huge_page;
+      if (begin < end) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_DONTNEED);
+    }
+  }
+  PoolUse use() {
+    const std::lock_guard lock(mutex_);
+    return {held_, in_use_};
   }
 
  private:
-  // Eight sizes from one power of two to the next; not a multiple of 4 KiB, so that blocks of one size do not start at
-  // the same place of the first cache.
-  static std::size_t size_class(std::size_t bytes) {
-    std::size_t step = 64;
-    while (16 * step <= bytes) step *= 2;
-    const std::size_t size = (bytes + step - 1) / step * step;
+  using ByPlace = std::map<char*, std::size_t>;
+
+  // Not a multiple of 4 KiB, so that blocks of one size, next to each other, do not start at the same place of the first cache.
+  static std::size_t whole(std::size_t bytes) {
+    const std::size_t size = (std::max<std::size_t>(bytes, 1) + 63) / 64 * 64;
     return size % 4096 == 0 ? size + 64 : size;
   }
-
-  struct Class {
-    std::vector<void*> free;
-    std::size_t blocks = 0;  // free or in use
-  };
+  void add_slab(std::size_t size) {
+    const std::size_t slab = std::max(next_slab_, (size + huge_page - 1) / huge_page * huge_page);
+    void* memory = std::aligned_alloc(huge_page, slab);
+    if (memory == nullptr) throw std::bad_alloc();
+    madvise(memory, slab, MADV_HUGEPAGE);  // a wish: without huge pages everything still works
+    add_free(static_cast<char*>(memory), slab);
+    held_ += slab;
+    next_slab_ = std::min(2 * next_slab_, largest_slab);
+  }
+  void add_free(char* at, std::size_t size) {
+    const auto noted = by_place_.emplace(at, size).first;
+    try {
+      by_size_.emplace(size, at);
+    } catch (...) {
+      by_place_.erase(noted);
+      throw;
+    }
+  }
+  ByPlace::iterator forget(ByPlace::iterator block) noexcept {
+    by_size_.erase({block->second, block->first});
+    return by_place_.erase(block);
+  }
 
   std::mutex mutex_;
-  std::map<std::size_t, Class> free_;
-  char* at_ = nullptr;
-  std::size_t left_ = 0, next_slab_ = huge_page;
+  ByPlace by_place_;
+  std::set<std::pair<std::size_t, char*>> by_size_;
+  std::size_t next_slab_ = huge_page, held_ = 0, in_use_ = 0;
 };
 
 HugePool& pool() {
@@ -78,5 +118,7 @@ HugePool& pool() {
 
 PoolBlock take_from_pool(std::size_t bytes) { return pool().take(bytes); }
 void give_to_pool(const PoolBlock& block) noexcept { pool().give(block); }
+PoolUse pool_use() { return pool().use(); }
+void trim_pool() noexcept { pool().trim(); }
 
 }  // namespace platen

@@ -16,10 +16,17 @@ struct PoolBlock {
   std::size_t bytes = 0;
 };
 
+struct PoolUse {
+  std::size_t held = 0, in_use = 0;  // by the pool, of the system's memory; by those who took blocks of it [bytes]
+};
+
 // A block of at least `bytes`, 64-byte aligned, of which all may be used. Any thread may ask; memory that is given back is
-// kept for others. Throws std::bad_alloc.
+// kept for others, joined with what is free next to it. Throws std::bad_alloc.
 PoolBlock take_from_pool(std::size_t bytes);
 void give_to_pool(const PoolBlock& block) noexcept;
+PoolUse pool_use();
+// Whole huge pages that nobody uses go back to the system, until they are taken again.
+void trim_pool() noexcept;
 
 // Blocks of this size and more are not kept: they would fill memory that is needed between rebuilds.
 inline constexpr std::size_t largest_pooled = std::size_t{1} << 24;

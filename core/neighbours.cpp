@@ -226,7 +226,7 @@ std::vector<Batch> make_batches(const Particles& p, const Domain& domain, const 
       batch.outer_i[kept] = i;
       batch.outer_j[kept++] = j;
     }
-    batch.outer_i.resize(kept), batch.outer_j.resize(kept);
+    for (auto* column : {&batch.outer_i, &batch.outer_j}) column->resize(kept), column->shrink_to_fit();
     std::erase_if(batch.partners, [&](int other) { return !shares[static_cast<std::size_t>(other)]; });
   });
   for (int k = 0; k < count; ++k)

@@ -526,10 +526,7 @@ void Simulation::advance(std::int64_t steps) {
     step_ += n;
     steps -= n;
     last_drift_ = dt_;
-    for (int axis = 0; axis < 3; ++axis) {
-      drift_at_rebuild_[axis] += mean_[axis] * (n * dt_);
-      drift_at_prune_[axis] += mean_[axis] * (n * dt_);
-    }
+    for (int axis = 0; axis < 3; ++axis) drift_at_prune_[axis] += mean_[axis] * (n * dt_);
     plane_moved_ += plane_path(n);
     moved_since_prune_ = true;
   }

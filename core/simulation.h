@@ -180,19 +180,19 @@ class Simulation {
   void merge_all();
   void keep_sums(AlignedArray<double>& sums);
   void put_sums(const AlignedArray<double>& sums);
-  LookTotals look_at(const AlignedArray<double>& margins, const AlignedArray<double>* then, const double (&drift)[3]);
-  void find_speeds();
+  LookTotals look_at(const AlignedArray<double>& margins);
+  AlignedArray<double> own_speeds() const;
   double own_speed(std::size_t k) const;
   void choose_horizon();
   double widest_margin() const;
   double least_margin(double speed) const;
-  void check_speeds();
-  bool choose_margins(bool fresh);
+  void check_speeds(const AlignedArray<double>& speeds);
+  bool choose_margins(bool fresh, const AlignedArray<double>& speeds);
   int look(int wanted);
   enum class Ways { within_margins, too_long, no_number };  // of spheres in a run of steps
   Ways look_back(int steps);
   bool unlisted_apart(int steps, const std::vector<char>& beyond) const;
-  void remember(AlignedArray<double>& reference, double (&drift)[3]);
+  void start_from_here();
   int prepare_lists(std::int64_t wanted);
   double plane_path(int steps) const;
   void run_chunk(int steps);
@@ -248,18 +248,16 @@ class Simulation {
   double inserted_ = 0.0, removed_ = 0.0;
 
   // Lists.
-  Margins inner_, outer_;
-  AlignedArray<double> speed_;                  // of each sphere, relative to mean_, when lists were last made [m/s]
+  Margins inner_, outer_;                       // at the last prune: what was left of the outer ones
   AlignedArray<double> room_;                   // what each sphere may still move [m]
   AlignedArray<double> speed2_;                 // of each sphere: sum over a run of steps of |v - mean_|^2 [m2/s2]
   double plate_gap_ = 0.0;                      // bound of the planes' motion that lists allow [m]
   double redo_margin_ = 0.0;                    // least margin after steps had to be done again [m]
   double kick_factor_ = 1.0;                    // on the mean speed, for spheres that will be hit
   int horizon_ = 64;                            // steps that lists should hold
-  AlignedArray<double> at_rebuild_, at_prune_;  // positions then, 3 per particle
+  AlignedArray<double> at_prune_;               // positions then, 3 per particle
   double mean_[3] = {0, 0, 0};                  // common velocity taken out of displacements [m/s]
-  double drift_at_rebuild_[3] = {0, 0, 0};      // displacement by mean_ since the rebuild [m]
-  double drift_at_prune_[3] = {0, 0, 0};
+  double drift_at_prune_[3] = {0, 0, 0};        // displacement by mean_ since then [m]
   double plane_moved_ = 0.0;     // bound of the planes' motion since the prune [m]
   bool lists_stale_ = false;     // prune before the next step
   bool moved_since_prune_ = true;

@@ -53,13 +53,16 @@ void Simulation::put_sums(const AlignedArray<double>& sums) {
   });
 }
 
-void Simulation::remember(AlignedArray<double>& reference, double (&drift)[3]) {
+// Inner lists hold from here on.
+void Simulation::start_from_here() {
   const auto n = static_cast<std::size_t>(particles_.count);
-  reference.resize(3 * n + padding);  // whole vectors may be read
-  std::copy_n(particles_.x.data(), n, reference.data());
-  std::copy_n(particles_.y.data(), n, reference.data() + n);
-  std::copy_n(particles_.z.data(), n, reference.data() + 2 * n);
-  std::fill(drift, drift + 3, 0.0);
+  at_prune_.resize(3 * n + padding);  // whole vectors may be read
+  std::copy_n(particles_.x.data(), n, at_prune_.data());
+  std::copy_n(particles_.y.data(), n, at_prune_.data() + n);
+  std::copy_n(particles_.z.data(), n, at_prune_.data() + 2 * n);
+  std::fill(drift_at_prune_, drift_at_prune_ + 3, 0.0);
+  plane_moved_ = 0.0;
+  moved_since_prune_ = false;
 }
 
 // Speed relative to the common velocity [m/s].
@@ -131,35 +134,35 @@ double Simulation::widest_margin() const {
 // Margin without which a sphere of this speed could not take a single step [m].
 double Simulation::least_margin(double speed) const { return 1.01 * (caution * speed + gravity_ * dt_) * dt_; }
 
-void Simulation::find_speeds() {
-  const auto n = static_cast<std::size_t>(particles_.count);
-  speed_.resize(n);
-  for (std::size_t k = 0; k < n; ++k) speed_[k] = own_speed(k);
+AlignedArray<double> Simulation::own_speeds() const {
+  AlignedArray<double> speeds;
+  speeds.resize(static_cast<std::size_t>(particles_.count));
+  for (std::size_t k = 0; k < speeds.size(); ++k) speeds[k] = own_speed(k);
+  return speeds;
 }
 
 // Ends the run where a sphere is too fast for any list. Looked for before lists are touched: what a failure tells, and
 // what is still written after it, needs lists and particles that belong together.
-void Simulation::check_speeds() {
-  find_speeds();
+void Simulation::check_speeds(const AlignedArray<double>& speeds) {
   double needed = 0.0;
-  for (std::size_t k = 0; k < static_cast<std::size_t>(particles_.count); ++k) needed = std::max(needed, least_margin(speed_[k]));
+  for (const double speed : speeds) needed = std::max(needed, least_margin(speed));
   if (needed > widest_margin())
     fail("a sphere moves " + std::to_string(needed / largest_radius_) +
          " radii in one step: more than lists can follow; use a smaller time step");
 }
 
-// Margins that hold for about a horizon, by the speeds that were found last (`fresh`: finds them, since spheres have new places); false where the outer lists are too narrow for them.
-bool Simulation::choose_margins(bool fresh) {
+// Margins that hold for about a horizon at these speeds; outer ones as well where lists are `fresh`. Else false where what is left of the
+// outer ones is too little: from prune to prune each sphere uses up the distance between its places at both.
+bool Simulation::choose_margins(bool fresh, const AlignedArray<double>& speeds) {
   const auto n = static_cast<std::size_t>(particles_.count);
   const double R = largest_radius_, most = widest_margin();
   inner_.of.resize(static_cast<std::size_t>(particles_.padded));
   if (fresh) outer_.of.resize(static_cast<std::size_t>(particles_.padded));
-  if (fresh) find_speeds();
-  if (!fresh) look_at(outer_.of, &at_rebuild_, drift_at_rebuild_);  // what the outer lists leave
+  if (!fresh) look_at(outer_.of);
   // Who is slow may be hit: a sphere's margin is never below what the mean speed, times a factor that grows whenever
   // steps had to be done again, takes.
   double mean_speed = 0.0;
-  for (std::size_t k = 0; k < n; ++k) mean_speed += speed_[k];
+  for (std::size_t k = 0; k < n; ++k) mean_speed += speeds[k];
   const double least_path = n > 0 ? caution * kick_factor_ * mean_speed / static_cast<double>(n) * dt_ : 0.0;
   kick_factor_ = std::max(1.0, 0.97 * kick_factor_);
   bool enough = true;
@@ -167,8 +170,8 @@ bool Simulation::choose_margins(bool fresh) {
   inner_.largest = 0.0;
   if (fresh) outer_.largest = 0.0;
   for (std::size_t k = 0; k < n; ++k) {
-    const double now = caution * speed_[k] * dt_, path = std::max(now, least_path);  // of one step
-    const double needed = least_margin(speed_[k]);
+    const double now = caution * speeds[k] * dt_, path = std::max(now, least_path);  // of one step
+    const double needed = least_margin(speeds[k]);
     const double wish = engine_.inner_gap > 0.0 ? 0.5 * engine_.inner_gap : std::max(smallest_inner * R, horizon_ * path);
     double inner = std::min(std::max({wish, redo_margin_, needed}), most);
     if (fresh) {
@@ -186,21 +189,22 @@ bool Simulation::choose_margins(bool fresh) {
   if (n > 0) counters_.gap = 2.0 * inner_sum / static_cast<double>(n);
   if (n > 0 && fresh) counters_.skin = 2.0 * outer_sum / static_cast<double>(n);
   plate_gap_ = std::max(0.05 * R, 1.5 * plane_path(horizon_));
+  if (!fresh && enough) outer_.of.swap(room_);
   return enough;
 }
 
-// Sets the room that each sphere has left of its margin since the positions `then`; null: nothing has moved since.
-LookTotals Simulation::look_at(const AlignedArray<double>& margins, const AlignedArray<double>* then, const double (&drift)[3]) {
+// Sets the room that each sphere has left of the margin that it had at the last prune.
+LookTotals Simulation::look_at(const AlignedArray<double>& margins) {
   room_.resize(static_cast<std::size_t>(particles_.padded));
   speed2_.resize(static_cast<std::size_t>(particles_.padded));
   const LookConstants constants{domain_.width, domain_.inverse_width, domain_.depth, domain_.inverse_depth,
-                                {drift[0], drift[1], drift[2]}, {mean_[0], mean_[1], mean_[2]}, std::numeric_limits<double>::infinity()};
+                                {drift_at_prune_[0], drift_at_prune_[1], drift_at_prune_[2]}, {mean_[0], mean_[1], mean_[2]}, std::numeric_limits<double>::infinity()};
   std::vector<LookTotals> found(batches_.size());
   parallel(static_cast<int>(batches_.size()), [&](int index) {
     const Batch& b = batches_[static_cast<std::size_t>(index)];
     const Particles& p = particles_;
     const auto first = static_cast<std::size_t>(b.first), n = static_cast<std::size_t>(p.count);
-    const auto column = [&](std::size_t axis) { return then != nullptr ? then->data() + axis * n + first : nullptr; };
+    const auto column = [&](std::size_t axis) { return moved_since_prune_ ? at_prune_.data() + axis * n + first : nullptr; };
     const LookBatch batch{p.x.data() + first, p.y.data() + first, p.z.data() + first, p.vx.data() + first, p.vy.data() + first, p.vz.data() + first,
                           column(0), column(1), column(2), margins.data() + first, room_.data() + first, speed2_.data() + first, b.count,
                           std::clamp(p.count - b.first, 0, b.count)};
@@ -214,7 +218,7 @@ LookTotals Simulation::look_at(const AlignedArray<double>& margins, const Aligne
 // For how many steps, at most `wanted`, the lists will hold if speeds do not grow much; 0 where not for one. Sets the
 // room that each sphere has left, which the steps watch.
 int Simulation::look(int wanted) {
-  const LookTotals found = look_at(inner_.of, moved_since_prune_ ? &at_prune_ : nullptr, drift_at_prune_);
+  const LookTotals found = look_at(inner_.of);
   const double fastest = caution * found.fastest, closest = gravity_ * dt_ * found.closest;
   const auto holds = [&](int steps) {  // a free fall or a push may add speed; a kick by gravity is the least to expect
     return (fastest + closest * steps) * (dt_ * steps) <= 1.0 && plane_moved_ + plane_path(steps) <= plate_gap_;
@@ -276,11 +280,7 @@ bool Simulation::unlisted_apart(int steps, const std::vector<char>& beyond) cons
   const double planes_moved = plane_moved_ + plane_path(steps);
   for (std::size_t k = 0; k < n; ++k) {
     if (!beyond[k]) continue;
-    double before[3];  // from rebuild to prune, relative to the common drift
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      before[axis] = at_prune(k, axis) - at_rebuild_[axis * n + k] - (drift_at_rebuild_[axis] - drift_at_prune_[axis]);
-    before[0] = domain_.nearest_x(before[0]), before[1] = domain_.nearest_y(before[1]);
-    if (!(std::hypot(before[0], before[1], before[2]) + way(k) <= outer_.of[k])) return false;
+    if (!(way(k) <= outer_.of[k])) return false;
     for (int plate = 0; plate < plate_count; ++plate) {
       const PlaneMotion& plane = planes_[static_cast<std::size_t>(plate)];
       if (!plane.present) continue;
@@ -293,12 +293,8 @@ bool Simulation::unlisted_apart(int steps, const std::vector<char>& beyond) cons
     }
   }
   for (const Batch& b : batches_) {
-    std::size_t listed = 0;
     for (std::size_t m = 0; m < b.outer_i.size(); ++m) {
-      if (listed < static_cast<std::size_t>(b.used) && b.from[listed] == static_cast<std::int32_t>(m)) {
-        ++listed;
-        continue;
-      }
+      if (b.listed[m / 64] >> (m % 64) & 1) continue;
       const auto i = static_cast<std::size_t>(b.outer_i[m]), j = static_cast<std::size_t>(b.outer_j[m]);
       if (!beyond[i] && !beyond[j]) continue;
       const double dx = domain_.nearest_x(at_prune(i, 0) - at_prune(j, 0)), dy = domain_.nearest_y(at_prune(i, 1) - at_prune(j, 1));
@@ -315,9 +311,14 @@ int Simulation::prepare_lists(std::int64_t wanted) {
   mean_velocity();
   if (lists_valid_ && !lists_stale_)
     if (const int steps = look(n); steps >= std::min(n, worthwhile)) return steps;
-  check_speeds();
-  choose_horizon();
-  if (lists_valid_ && choose_margins(false))
+  bool wide_enough = lists_valid_;
+  {
+    const AlignedArray<double> speeds = own_speeds();
+    check_speeds(speeds);
+    choose_horizon();
+    wide_enough = wide_enough && choose_margins(false, speeds);
+  }
+  if (wide_enough)
     prune_lists();
   else
     rebuild();
@@ -331,13 +332,14 @@ void Simulation::prune_lists() {
   const ParallelFor run = on_workers();
   prune(batches_, particles_, domain_, inner_, keeps_k_t(), run);
   list_plates(batches_, particles_, planes_, step_, inner_, plate_gap_, plates, run);
-  remember(at_prune_, drift_at_prune_);
-  plane_moved_ = 0.0;
-  moved_since_prune_ = false;
+  start_from_here();
   ++counters_.prunes;
 }
 
-void Simulation::rebuild() { rebuild_with(pair_history(batches_, particles_, on_workers())); }
+void Simulation::rebuild() {
+  *saved_ = {};  // nobody goes back behind a rebuild: meanwhile others may use the memory
+  rebuild_with(pair_history(batches_, particles_, on_workers()));
+}
 
 void Simulation::rebuild_with(const PairHistories& pairs) {
   AlignedArray<double> sums;
@@ -374,7 +376,7 @@ void Simulation::rebuild_from(const PairHistories& pairs, const std::vector<Plat
   const std::vector<std::int32_t> order = morton_order(particles_, 0, run);
   particles_.permute(order, run);
   const std::int32_t* const bucket = pairs.by_place ? order.data() : particles_.rank.data();
-  choose_margins(true);
+  choose_margins(true, own_speeds());
   for (auto& graph : graphs_) graph.reset();
   table_.reset();
   asks_.clear();
@@ -388,10 +390,7 @@ void Simulation::rebuild_from(const PairHistories& pairs, const std::vector<Plat
   unroll_ = engine_.unroll;
   prepare_table();
   prepare_graph();
-  remember(at_rebuild_, drift_at_rebuild_);
-  remember(at_prune_, drift_at_prune_);
-  plane_moved_ = 0.0;
-  moved_since_prune_ = false;
+  start_from_here();
   lists_valid_ = true;
   ++counters_.rebuilds;
   counters_.batches = static_cast<int>(batches_.size());

@@ -1,0 +1,118 @@
+// Memory on huge pages [core/huge_pool.h].
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <random>
+#include <thread>
+#include <vector>
+
+#include "core/aligned.h"
+#include "core/huge_pool.h"
+
+namespace platen {
+namespace {
+
+struct Taken {
+  PoolBlock block;
+  unsigned char mark;
+};
+
+// Blocks of any size, in any order: each keeps what was written to all of it until it goes back.
+void take_and_give(unsigned seed, int rounds, std::vector<Taken>& taken) {
+  std::mt19937 random(seed);
+  for (int round = 0; round < rounds; ++round) {
+    if (taken.empty() || random() % 5 < 3) {
+      const std::size_t bytes = std::size_t{1} << (random() % 18), wanted = bytes + random() % bytes;
+      const Taken one{take_from_pool(wanted), static_cast<unsigned char>(random())};
+      ASSERT_GE(one.block.bytes, wanted);
+      ASSERT_EQ(reinterpret_cast<std::uintptr_t>(one.block.memory) % 64, 0u);
+      std::memset(one.block.memory, one.mark, one.block.bytes);
+      taken.push_back(one);
+    } else {
+      std::swap(taken[random() % taken.size()], taken.back());
+      const auto* const at = static_cast<const unsigned char*>(taken.back().block.memory);
+      const unsigned char mark = taken.back().mark;
+      ASSERT_TRUE(std::all_of(at, at + taken.back().block.bytes, [mark](unsigned char c) { return c == mark; }));
+      give_to_pool(taken.back().block);
+      taken.pop_back();
+    }
+  }
+}
+
+TEST(HugePool, BlocksAreTheirOwners) {
+  const PoolUse before = pool_use();
+  std::vector<std::vector<Taken>> taken(4);
+  std::vector<std::thread> threads;
+  for (unsigned k = 0; k < 4; ++k) threads.emplace_back([&, k] { take_and_give(k, 3000, taken[k]); });
+  for (std::thread& thread : threads) thread.join();
+  std::vector<Taken> all;
+  std::size_t bytes = 0;
+  for (const auto& of_thread : taken)
+    for (const Taken& one : of_thread) all.push_back(one), bytes += one.block.bytes;
+  ASSERT_GT(all.size(), 100u);
+  EXPECT_EQ(pool_use().in_use, before.in_use + bytes);
+  std::sort(all.begin(), all.end(), [](const Taken& a, const Taken& b) { return a.block.memory < b.block.memory; });
+  for (std::size_t k = 1; k < all.size(); ++k)
+    EXPECT_LE(static_cast<char*>(all[k - 1].block.memory) + all[k - 1].block.bytes, static_cast<char*>(all[k].block.memory));
+  for (const Taken& one : all) give_to_pool(one.block);
+  EXPECT_EQ(pool_use().in_use, before.in_use);
+}
+
+// What was given back in small pieces can be taken as a large one.
+TEST(HugePool, JoinsWhatIsFree) {
+  constexpr std::size_t slab = std::size_t{1} << 25, piece = 20000;
+  std::vector<PoolBlock> pieces;
+  for (std::size_t bytes = 0; bytes < 4 * slab; bytes += piece) pieces.push_back(take_from_pool(piece));
+  const std::size_t held = pool_use().held;
+  std::shuffle(pieces.begin(), pieces.end(), std::mt19937(1));
+  for (const PoolBlock& block : pieces) give_to_pool(block);
+  std::vector<PoolBlock> large;
+  for (int k = 0; k < 3; ++k) large.push_back(take_from_pool(slab / 2 + slab / 4));
+  EXPECT_EQ(pool_use().held, held);
+  for (const PoolBlock& block : large) give_to_pool(block);
+}
+
+// What nobody uses may go; what somebody uses stays.
+TEST(HugePool, TrimsWhatIsFree) {
+  std::vector<Taken> taken;
+  take_and_give(5, 2000, taken);
+  const PoolBlock large = take_from_pool(std::size_t{1} << 23);
+  give_to_pool(large);
+  trim_pool();
+  ASSERT_GT(taken.size(), 100u);
+  for (const Taken& one : taken) {
+    const auto* const at = static_cast<const unsigned char*>(one.block.memory);
+    EXPECT_TRUE(std::all_of(at, at + one.block.bytes, [&](unsigned char c) { return c == one.mark; }));
+    give_to_pool(one.block);
+  }
+  taken.clear();
+  take_and_give(6, 2000, taken);
+  for (const Taken& one : taken) give_to_pool(one.block);
+}
+
+// Arrays of equal length, one after the other, do not begin at the same place of the first cache.
+TEST(HugePool, BlocksOfWholePagesAreStaggered) {
+  const PoolBlock a = take_from_pool(8 * 4096), b = take_from_pool(8 * 4096);
+  EXPECT_NE(a.bytes % 4096, 0u);
+  give_to_pool(a), give_to_pool(b);
+}
+
+TEST(AlignedArray, RenewsInMemoryOfItsLength) {
+  if (!pools) GTEST_SKIP() << "no pool under AddressSanitizer";
+  AlignedArray<double> a;
+  a.assign(100000, 1.0);
+  a.renew(99000, 2.0);  // nearly as long: the same memory
+  EXPECT_GE(a.capacity(), 100000u);
+  a.renew(50000, 3.0);
+  EXPECT_LT(a.capacity(), 51000u);
+  EXPECT_EQ(a.size(), 50000u);
+  EXPECT_TRUE(std::all_of(a.begin(), a.end(), [](double v) { return v == 3.0; }));
+  a.renew(60000, 4.0);
+  EXPECT_LT(a.capacity(), 61000u);
+  EXPECT_TRUE(std::all_of(a.begin(), a.end(), [](double v) { return v == 4.0; }));
+}
+
+}  // namespace
+}  // namespace platen
