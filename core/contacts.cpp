@@ -22,6 +22,18 @@ void for_each_bit(std::uint64_t bits, const Visit& visit) {
   for (; bits != 0; bits &= bits - 1) visit(std::countr_zero(bits));
 }
 
+// Which pairs are closer than their radii and margins.
+struct Closer {
+  const Particles& particles;
+  const Domain& domain;
+  const Margins& margins;
+  const KernelTable& kernels;
+  void choose(const Batch& b, std::uint64_t* chosen) const {
+    kernels.choose({particles.rows.data(), margins.of.data(), b.outer_i.data(), b.outer_j.data(), static_cast<std::int64_t>(b.outer_j.size()),
+                    domain.width, domain.inverse_width, domain.depth, domain.inverse_depth, chosen});
+  }
+};
+
 // New inner list of one batch in the making; the same memory for every batch that a thread works on.
 struct Inner {
   std::vector<std::int32_t> from;                          // places in the outer list, ascending
@@ -30,19 +42,16 @@ struct Inner {
   std::vector<std::int32_t> slot_of;                       // of foreign particles; -1 where none
   std::vector<std::int32_t> distances;                     // along the curve, of a sample of contacts
 
-  // Starts a list of the outer pairs that `close(i, j)` accepts.
-  template <class Close>
-  void choose(const Batch& batch, const Close& close) {
+  // Starts a list of those outer pairs that are closer than their margins.
+  void choose(const Batch& batch, const Closer& closer) {
     const std::size_t outer = batch.outer_j.size();
     listed.renew((outer + 63) / 64, 0);
-    from.clear();
-    for (std::size_t first = 0; first < outer; first += 64) {
-      std::uint64_t chosen = 0;
-      for (std::size_t m = first; m < std::min(first + 64, outer); ++m)  // without a branch, which no processor could foresee
-        chosen |= std::uint64_t{close(batch.outer_i[m], batch.outer_j[m])} << (m - first);
-      listed[first / 64] = chosen;
-      for_each_bit(chosen, [&](int bit) { from.push_back(static_cast<std::int32_t>(first) + bit); });
-    }
+    closer.choose(batch, listed.data());
+    from.resize(outer);
+    std::size_t kept = 0;
+    for (std::size_t word = 0; word < listed.size(); ++word)
+      for_each_bit(listed[word], [&](int bit) { from[kept++] = static_cast<std::int32_t>(64 * word) + bit; });
+    from.resize(kept);
   }
   std::size_t padded() const { return (from.size() + pair_padding - 1) / pair_padding * pair_padding; }
   void clear_history(bool with_k_t) {
@@ -127,18 +136,6 @@ void connect_halos(std::vector<Batch>& batches, const ParallelFor& parallel) {
   });
 }
 
-// Whether two particles are closer than their radii and margins.
-struct Closer {
-  const double* rows;
-  const double* margin;
-  const Domain& domain;
-  bool operator()(std::int32_t i, std::int32_t j) const {
-    const double *a = rows + row_size * static_cast<std::size_t>(i), *b = rows + row_size * static_cast<std::size_t>(j);
-    const double reach = (a[3] + margin[static_cast<std::size_t>(i)]) + (b[3] + margin[static_cast<std::size_t>(j)]);
-    return distance2(a, b, domain) < reach * reach;
-  }
-};
-
 [[noreturn]] void lost(const Particles& p, std::int32_t i, std::int32_t j) {
   throw std::logic_error("a touching pair is missing from the rebuilt lists: ids " +
                          std::to_string(p.id_of_rank[static_cast<std::size_t>(p.rank[static_cast<std::size_t>(i)])]) + " and " +
@@ -196,8 +193,8 @@ std::vector<PlateHistory> plate_history(const std::vector<Batch>& batches, const
 }
 
 void prune(std::vector<Batch>& batches, const Particles& p, const Domain& domain, const Margins& margins, bool with_k_t,
-           const ParallelFor& parallel) {
-  const Closer close{p.rows.data(), margins.of.data(), domain};
+           const KernelTable& kernels, const ParallelFor& parallel) {
+  const Closer close{p, domain, margins, kernels};
   parallel(static_cast<int>(batches.size()), [&](int k) {
     Batch& b = batches[static_cast<std::size_t>(k)];
     Inner& inner = inner_of_this_thread();
@@ -224,9 +221,9 @@ void prune(std::vector<Batch>& batches, const Particles& p, const Domain& domain
 }
 
 void fill_inner(std::vector<Batch>& batches, const Particles& p, const Domain& domain, const Margins& margins,
-                bool with_k_t, const PairHistories& history, const std::int32_t* bucket, const ParallelFor& parallel) {
+                bool with_k_t, const PairHistories& history, const std::int32_t* bucket, const KernelTable& kernels, const ParallelFor& parallel) {
   std::vector<std::int64_t> found(batches.size(), 0);
-  const Closer close{p.rows.data(), margins.of.data(), domain};
+  const Closer close{p, domain, margins, kernels};
   parallel(static_cast<int>(batches.size()), [&](int k) {
     Batch& b = batches[static_cast<std::size_t>(k)];
     Inner& inner = inner_of_this_thread();

@@ -43,12 +43,12 @@ std::vector<PlateHistory> plate_history(const std::vector<Batch>& batches, const
 // the old inner lists, and the sums of particles, which must be merged, stay. Throws std::logic_error if a pair with
 // history would be lost (a bug of ours).
 void prune(std::vector<Batch>& batches, const Particles& particles, const Domain& domain, const Margins& margins,
-           bool with_k_t, const ParallelFor& parallel);
+           bool with_k_t, const KernelTable& kernels, const ParallelFor& parallel);
 
 // The same for fresh batches without inner lists. bucket[place]: where `history` has a sphere's pairs. Throws std::logic_error if not all of
 // `history` is carried.
 void fill_inner(std::vector<Batch>& batches, const Particles& particles, const Domain& domain, const Margins& margins,
-                bool with_k_t, const PairHistories& history, const std::int32_t* bucket, const ParallelFor& parallel);
+                bool with_k_t, const PairHistories& history, const std::int32_t* bucket, const KernelTable& kernels, const ParallelFor& parallel);
 
 // Lists of the spheres closer to a present plane than their margins and `gap`, with history from `history` (sorted).
 void list_plates(std::vector<Batch>& batches, const Particles& particles, const Planes& planes, std::int64_t step,

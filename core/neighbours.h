@@ -31,12 +31,6 @@ struct Domain {
   }
 };
 
-// Squared distance of the centres of two rows, nearest images [m2].
-inline double distance2(const double* a, const double* b, const Domain& domain) {
-  const double dx = domain.nearest_x(a[0] - b[0]), dy = domain.nearest_y(a[1] - b[1]), dz = a[2] - b[2];
-  return dx * dx + dy * dy + dz * dz;
-}
-
 // Whose a pair across two batches is.
 enum class Ownership {
   ahead,     // of the one whose sphere has the other's ahead of it on the curve, taken as a ring

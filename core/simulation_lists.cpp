@@ -330,7 +330,7 @@ void Simulation::prune_lists() {
   merge_all();
   const auto plates = plate_history(batches_, particles_);
   const ParallelFor run = on_workers();
-  prune(batches_, particles_, domain_, inner_, keeps_k_t(), run);
+  prune(batches_, particles_, domain_, inner_, keeps_k_t(), kernels_, run);
   list_plates(batches_, particles_, planes_, step_, inner_, plate_gap_, plates, run);
   start_from_here();
   ++counters_.prunes;
@@ -358,7 +358,7 @@ void Simulation::cut_into_batches(const PairHistories& pairs, const std::int32_t
   batches_.clear();  // before the new ones are made: their memory serves again
   const Ownership ownership = engine_.fused ? Ownership::by_colour : Ownership::ahead;
   batches_ = make_batches(particles_, domain_, outer_, cuts, ownership, kernels_, run);
-  fill_inner(batches_, particles_, domain_, inner_, keeps_k_t(), pairs, bucket, run);
+  fill_inner(batches_, particles_, domain_, inner_, keeps_k_t(), pairs, bucket, kernels_, run);
   const double bytes = touched_bytes(batches_);
   asks_ahead_ = bytes > 0.5 * engine_.cache * engine_.threads;
   asks_history_ = bytes > 2.0 * engine_.cache;

@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "kernels/choose_kernel.h"
 #include "kernels/contact_kernel.h"
 #include "kernels/kernel_table.h"
 #include "kernels/look_kernel.h"
@@ -67,6 +68,7 @@ KernelTable kernels_of(InstructionSet set, const KernelRequest& request) {
                               : motion_of<I, false>(equal_spheres, request.rolling);
   table.merge = &merge_kernel<I>;
   table.search = &search_kernel<I>;
+  table.choose = &choose_kernel<I>;
   table.look = &look_kernel<I>;
   return table;
 }

@@ -17,6 +17,7 @@ struct KernelTable {
   void (*motion)(const MotionBatch&, const MotionConstants&, MotionTotals&) noexcept = nullptr;
   void (*merge)(const SharesBatch&) noexcept = nullptr;
   int (*search)(const SearchMembers&, const SearchRange*, int count, const SearchedSphere&, std::int32_t* found) noexcept = nullptr;
+  void (*choose)(const ChooseBatch&) noexcept = nullptr;
   void (*look)(const LookBatch&, const LookConstants&, LookTotals&) noexcept = nullptr;
   InstructionSet instruction_set = InstructionSet::scalar;
   int scene = 0;             // index into built_scenes

@@ -146,6 +146,15 @@ struct SearchedSphere {
   double particle, first_of_batch;
 };
 
+// Pairs of an outer list, of which the inner one takes those closer than their radii and margins.
+struct ChooseBatch {
+  const double *rows, *margin;
+  const std::int32_t *i, *j;
+  std::int64_t count;
+  double width, inverse_width, depth, inverse_depth;  // periodic lengths [m]; 0 where not periodic
+  std::uint64_t* chosen;                              // out: a bit for each pair, the first of 64 lowest
+};
+
 // Spheres of a batch when lists are looked at: now, and when the list in question was made.
 struct LookBatch {
   const double *x, *y, *z, *vx, *vy, *vz;

@@ -204,6 +204,7 @@ class RealChecks {
       I::template fetch_rows<12>(row, index, fields);
       for (int k = 0; k < 12; ++k)
         each("fetch_rows", fields[k], [&](int lane) { return 1000.0 + 12 * index[lane] + k; });
+      each("gather", I::gather(row, index), [&](int lane) { return 1000.0 + index[lane]; });
       Real part_of_row[4];
       std::int32_t place[W];
       for (int lane = 0; lane < W; ++lane) place[lane] = 12 * index[lane];
