@@ -1,5 +1,5 @@
 // Arrays for vector loads: 64-byte aligned, on huge pages where they are large and the system has them, each with its
-// own start within a page so that arrays of equal length do not fight for the same cache sets.
+// own start within a page so that arrays of equal length do not fight for the same cache sets (those of the pool as its blocks start).
 #pragma once
 
 #include <sys/mman.h>

@@ -56,7 +56,7 @@ class HugePool {
     }
     try {
       add_free(at, size);
-    } catch (const std::bad_alloc&) {  // no memory for a note of it: this block serves nobody any more
+    } catch (const std::bad_alloc&) {  // no memory for a note of it: it serves nobody any more, nor does what is free next to it
     }
   }
   void trim() noexcept {
@@ -75,17 +75,23 @@ class HugePool {
  private:
   using ByPlace = std::map<char*, std::size_t>;
 
-  // Not a multiple of 4 KiB, so that blocks of one size, next to each other, do not start at the same place of the first cache.
+  // An odd number of lines, so that blocks of one size, next to each other, start at all the places of a page in turn: else they
+  // would fight for the same sets of the first cache.
   static std::size_t whole(std::size_t bytes) {
-    const std::size_t size = (std::max<std::size_t>(bytes, 1) + 63) / 64 * 64;
-    return size % 4096 == 0 ? size + 64 : size;
+    const std::size_t lines = (std::max<std::size_t>(bytes, 1) + 63) / 64;
+    return 64 * (lines | 1);
   }
   void add_slab(std::size_t size) {
     const std::size_t slab = std::max(next_slab_, (size + huge_page - 1) / huge_page * huge_page);
     void* memory = std::aligned_alloc(huge_page, slab);
     if (memory == nullptr) throw std::bad_alloc();
     madvise(memory, slab, MADV_HUGEPAGE);  // a wish: without huge pages everything still works
-    add_free(static_cast<char*>(memory), slab);
+    try {
+      add_free(static_cast<char*>(memory), slab);
+    } catch (...) {
+      std::free(memory);
+      throw;
+    }
     held_ += slab;
     next_slab_ = std::min(2 * next_slab_, largest_slab);
   }

@@ -17,7 +17,7 @@ struct PoolBlock {
 };
 
 struct PoolUse {
-  std::size_t held = 0, in_use = 0;  // by the pool, of the system's memory; by those who took blocks of it [bytes]
+  std::size_t held = 0, in_use = 0;  // by the pool, resident or not; by those who took blocks of it [bytes]
 };
 
 // A block of at least `bytes`, 64-byte aligned, of which all may be used. Any thread may ask; memory that is given back is

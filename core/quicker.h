@@ -6,8 +6,8 @@
 
 namespace platen {
 
-// One after the other, a few runs of each, and once more unless every run of the one took less than every run of the other; the first run
-// of each block does not count, since caches are not yet what they will be. Then the quicker one, until others may have become faster.
+// One after the other, a few runs of each, and once more unless every run of the one took clearly less than every run of the other; the first
+// run of each block does not count, since caches are not yet what they will be. Then the quicker one, until others may have become faster.
 // Nothing but time may depend on the way.
 class Quicker {
  public:
@@ -29,7 +29,7 @@ class Quicker {
 
  private:
   void next_block();
-  bool all_quicker(int way) const;
+  bool clearly_quicker(int way) const;
 
   bool trying_ = true;
   int way_ = 0, runs_ = 0, blocks_ = 0;

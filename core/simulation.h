@@ -248,7 +248,7 @@ class Simulation {
   double inserted_ = 0.0, removed_ = 0.0;
 
   // Lists.
-  Margins inner_, outer_;                       // at the last prune: what was left of the outer ones
+  Margins inner_, outer_;                       // from the last prune on: of the outer ones, what was left then
   AlignedArray<double> room_;                   // what each sphere may still move [m]
   AlignedArray<double> speed2_;                 // of each sphere: sum over a run of steps of |v - mean_|^2 [m2/s2]
   double plate_gap_ = 0.0;                      // bound of the planes' motion that lists allow [m]

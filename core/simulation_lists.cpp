@@ -336,12 +336,10 @@ void Simulation::prune_lists() {
   ++counters_.prunes;
 }
 
-void Simulation::rebuild() {
-  *saved_ = {};  // nobody goes back behind a rebuild: meanwhile others may use the memory
-  rebuild_with(pair_history(batches_, particles_, on_workers()));
-}
+void Simulation::rebuild() { rebuild_with(pair_history(batches_, particles_, on_workers())); }
 
 void Simulation::rebuild_with(const PairHistories& pairs) {
+  *saved_ = {};  // nobody goes back behind a rebuild: meanwhile others may use the memory
   AlignedArray<double> sums;
   const bool had_forces = !batches_.empty();
   if (had_forces) keep_sums(sums);

@@ -155,7 +155,7 @@ struct ChooseBatch {
   std::uint64_t* chosen;                              // out: a bit for each pair, the first of 64 lowest
 };
 
-// Spheres of a batch when lists are looked at: now, and when the list in question was made.
+// Spheres of a batch when lists are looked at: now, and at the last prune.
 struct LookBatch {
   const double *x, *y, *z, *vx, *vy, *vz;
   const double *then_x, *then_y, *then_z;  // null where nothing has moved since

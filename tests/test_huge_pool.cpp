@@ -1,10 +1,12 @@
 // Memory on huge pages [core/huge_pool.h].
 #include <gtest/gtest.h>
+#include <sys/mman.h>
 
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <random>
+#include <set>
 #include <thread>
 #include <vector>
 
@@ -78,9 +80,19 @@ TEST(HugePool, JoinsWhatIsFree) {
 TEST(HugePool, TrimsWhatIsFree) {
   std::vector<Taken> taken;
   take_and_give(5, 2000, taken);
-  const PoolBlock large = take_from_pool(std::size_t{1} << 23);
+  constexpr std::size_t page = 4096, size = std::size_t{1} << 23, pages = size / page;
+  const PoolBlock large = take_from_pool(size + page);
+  std::memset(large.memory, 1, large.bytes);
+  const auto resident = [&] {
+    void* const first = reinterpret_cast<void*>((reinterpret_cast<std::uintptr_t>(large.memory) + page - 1) / page * page);
+    std::vector<unsigned char> in_core(pages);
+    EXPECT_EQ(mincore(first, size, in_core.data()), 0);
+    return std::count_if(in_core.begin(), in_core.end(), [](unsigned char c) { return (c & 1) != 0; });
+  };
+  EXPECT_EQ(resident(), static_cast<std::ptrdiff_t>(pages));
   give_to_pool(large);
   trim_pool();
+  EXPECT_LE(resident(), static_cast<std::ptrdiff_t>(pages / 2));  // at least two of its four huge pages are free as a whole
   ASSERT_GT(taken.size(), 100u);
   for (const Taken& one : taken) {
     const auto* const at = static_cast<const unsigned char*>(one.block.memory);
@@ -93,14 +105,17 @@ TEST(HugePool, TrimsWhatIsFree) {
 }
 
 // Arrays of equal length, one after the other, do not begin at the same place of the first cache.
-TEST(HugePool, BlocksOfWholePagesAreStaggered) {
-  const PoolBlock a = take_from_pool(8 * 4096), b = take_from_pool(8 * 4096);
-  EXPECT_NE(a.bytes % 4096, 0u);
-  give_to_pool(a), give_to_pool(b);
+TEST(HugePool, BlocksOfOneSizeStartAtAllPlacesOfAPage) {
+  for (const std::size_t bytes : {8 * 4096, 8 * 4096 + 2048, 8 * 4096 + 64, 12345}) {
+    const PoolBlock block = take_from_pool(bytes);
+    std::set<std::size_t> starts;
+    for (std::size_t k = 0; k < 64; ++k) starts.insert(k * block.bytes % 4096);
+    EXPECT_EQ(starts.size(), 64u) << bytes;
+    give_to_pool(block);
+  }
 }
 
 TEST(AlignedArray, RenewsInMemoryOfItsLength) {
-  if (!pools) GTEST_SKIP() << "no pool under AddressSanitizer";
   AlignedArray<double> a;
   a.assign(100000, 1.0);
   a.renew(99000, 2.0);  // nearly as long: the same memory

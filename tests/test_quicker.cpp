@@ -27,6 +27,19 @@ TEST(Quicker, TriesBothInTurnAndTakesTheQuicker) {
     }
 }
 
+// What only becomes slower, or quicker, is no way's doing.
+TEST(Quicker, ATrendEndsNoTrialEarly) {
+  for (const double trend : {1.001, 0.999}) {
+    Quicker quicker;
+    double seconds = 1.0;
+    for (int run = 0; run < trial; ++run) {
+      EXPECT_TRUE(quicker.trying());
+      quicker.took(seconds *= trend);
+    }
+    EXPECT_FALSE(quicker.trying());
+  }
+}
+
 // The first run of a block, and one that something else held up, decide nothing.
 TEST(Quicker, SingleRunsDecideNothing) {
   Quicker quicker;
