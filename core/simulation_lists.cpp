@@ -311,14 +311,10 @@ int Simulation::prepare_lists(std::int64_t wanted) {
   mean_velocity();
   if (lists_valid_ && !lists_stale_)
     if (const int steps = look(n); steps >= std::min(n, worthwhile)) return steps;
-  bool wide_enough = lists_valid_;
-  {
-    const AlignedArray<double> speeds = own_speeds();
-    check_speeds(speeds);
-    choose_horizon();
-    wide_enough = wide_enough && choose_margins(false, speeds);
-  }
-  if (wide_enough)
+  const AlignedArray<double> speeds = own_speeds();
+  check_speeds(speeds);
+  choose_horizon();
+  if (lists_valid_ && choose_margins(false, speeds))
     prune_lists();
   else
     rebuild();

@@ -1,7 +1,7 @@
 // Which pairs of an outer list belong into the inner one [core/contacts.cpp].
 #pragma once
 
-#include "kernels/real.h"
+#include "kernels/vec3.h"
 #include "kernels/views.h"
 
 namespace platen {
@@ -10,11 +10,10 @@ namespace platen {
 template <class I>
 PLATEN_INLINE unsigned closer(const ChooseBatch& b, const std::int32_t* i, const std::int32_t* j) {
   using Real = typename I::Real;
-  const auto nearest = [](const Real& d, double width, double inverse) { return d - I::set(width) * I::round(d * I::set(inverse)); };
   Real own[4], other[4];  // x y z R
   I::template fetch_rows<row_size>(b.rows, i, own);
   I::template fetch_rows<row_size>(b.rows, j, other);
-  const Real dx = nearest(own[0] - other[0], b.width, b.inverse_width), dy = nearest(own[1] - other[1], b.depth, b.inverse_depth);
+  const Real dx = nearest_image<I>(own[0] - other[0], b.width, b.inverse_width), dy = nearest_image<I>(own[1] - other[1], b.depth, b.inverse_depth);
   const Real dz = own[2] - other[2], reach = (own[3] + I::gather(b.margin, i)) + (other[3] + I::gather(b.margin, j));
   return I::bits((dx * dx + dy * dy) + dz * dz < reach * reach);
 }

@@ -2,7 +2,7 @@
 // [core/simulation_lists.cpp, Simulation::look_at].
 #pragma once
 
-#include "kernels/real.h"
+#include "kernels/vec3.h"
 #include "kernels/views.h"
 
 namespace platen {
@@ -13,7 +13,6 @@ void look_kernel(const LookBatch& b, const LookConstants& c, LookTotals& totals)
   using Real = typename I::Real;
   const Real zero = I::set(0.0), one = I::set(1.0), tiny = I::set(1e-100);
   const auto length = [](const Real& x, const Real& y, const Real& z) { return I::sqrt((x * x + y * y) + z * z); };
-  const auto nearest = [](const Real& d, double width, double inverse) { return d - I::set(width) * I::round(d * I::set(inverse)); };
   double lanes[I::width];
   for (int lane = 0; lane < I::width; ++lane) lanes[lane] = lane;
   const Real lane_numbers = I::load(lanes);
@@ -21,8 +20,8 @@ void look_kernel(const LookBatch& b, const LookConstants& c, LookTotals& totals)
   for (std::int32_t k = 0; k < b.count; k += I::width) {
     Real left = I::load(b.margin + k);
     if (b.then_x != nullptr) {
-      const Real dx = nearest(I::load(b.x + k) - I::load(b.then_x + k) - I::set(c.drift[0]), c.width, c.inverse_width);
-      const Real dy = nearest(I::load(b.y + k) - I::load(b.then_y + k) - I::set(c.drift[1]), c.depth, c.inverse_depth);
+      const Real dx = nearest_image<I>(I::load(b.x + k) - I::load(b.then_x + k) - I::set(c.drift[0]), c.width, c.inverse_width);
+      const Real dy = nearest_image<I>(I::load(b.y + k) - I::load(b.then_y + k) - I::set(c.drift[1]), c.depth, c.inverse_depth);
       left = left - length(dx, dy, I::load(b.z + k) - I::load(b.then_z + k) - I::set(c.drift[2]));
     }
     const Real speed = length(I::load(b.vx + k) - I::set(c.mean[0]), I::load(b.vy + k) - I::set(c.mean[1]), I::load(b.vz + k) - I::set(c.mean[2]));

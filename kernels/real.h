@@ -164,7 +164,7 @@ struct Avx2 {
     const double x = v[0] > v[1] ? v[0] : v[1], y = v[2] > v[3] ? v[2] : v[3];
     return x > y ? x : y;
   }
-  static PLATEN_INLINE Real gather(const double* p, const std::int32_t* place) {  // quicker than the instruction
+  static PLATEN_INLINE Real gather(const double* p, const std::int32_t* place) {
     return _mm256_set_pd(p[place[3]], p[place[2]], p[place[1]], p[place[0]]);
   }
   static PLATEN_INLINE void transpose(__m256d& a, __m256d& b, __m256d& c, __m256d& d) {
@@ -292,7 +292,7 @@ struct Avx512 {
   static PLATEN_INLINE double sum(Real a) { return _mm512_reduce_add_pd(a); }
   static PLATEN_INLINE double largest(Real a) { return _mm512_reduce_max_pd(a); }
 
-  static PLATEN_INLINE Real gather(const double* p, const std::int32_t* place) {  // quicker than the instruction
+  static PLATEN_INLINE Real gather(const double* p, const std::int32_t* place) {
     return _mm512_set_pd(p[place[7]], p[place[6]], p[place[5]], p[place[4]], p[place[3]], p[place[2]], p[place[1]], p[place[0]]);
   }
 

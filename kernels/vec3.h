@@ -51,4 +51,10 @@ PLATEN_INLINE Vec3<I> where(typename I::Mask m, const Vec3<I>& a, const Vec3<I>&
   return {I::where(m, a.x, b.x), I::where(m, a.y, b.y), I::where(m, a.z, b.z)};
 }
 
+// The image of a difference nearest to 0 along an axis of this periodic length; the difference itself where that is 0.
+template <class I>
+PLATEN_INLINE typename I::Real nearest_image(const typename I::Real& d, double length, double inverse) {
+  return d - I::set(length) * I::round(d * I::set(inverse));
+}
+
 }  // namespace platen

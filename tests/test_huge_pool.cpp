@@ -1,6 +1,7 @@
 // Memory on huge pages [core/huge_pool.h].
 #include <gtest/gtest.h>
 #include <sys/mman.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -80,7 +81,7 @@ TEST(HugePool, JoinsWhatIsFree) {
 TEST(HugePool, TrimsWhatIsFree) {
   std::vector<Taken> taken;
   take_and_give(5, 2000, taken);
-  constexpr std::size_t page = 4096, size = std::size_t{1} << 23, pages = size / page;
+  const std::size_t page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE)), size = std::size_t{1} << 23, pages = size / page;
   const PoolBlock large = take_from_pool(size + page);
   std::memset(large.memory, 1, large.bytes);
   const auto resident = [&] {
