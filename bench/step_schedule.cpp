@@ -22,39 +22,44 @@ struct Schedule {
   double longest = 0.0;   // longest chain of tasks that need each other's results [s]
 };
 
-// Whoever is free takes the first ready task in the order of the table, or, by workers, each the next of its own.
+// Whoever is free takes the first ready task in the order of the table, or, by workers, the first of its own.
 Schedule schedule(const TaskTable& table, const std::vector<double>& cost, int workers, Takers takers) {
   const std::size_t count = table.tasks().size();
+  const bool own = takers == Takers::workers && !table.worker().empty();
   std::vector<std::int32_t> waits = table.predecessors();
-  const std::vector<std::int32_t> own = takers == Takers::workers ? table.next_of_worker() : std::vector<std::int32_t>();  // a worker's next task waits for its last one
-  for (const std::int32_t next : own)
-    if (next >= 0) ++waits[static_cast<std::size_t>(next)];
   std::vector<double> chain(count, 0.0);
-  std::priority_queue<std::int32_t, std::vector<std::int32_t>, std::greater<>> ready;
+  using Ready = std::priority_queue<std::int32_t, std::vector<std::int32_t>, std::greater<>>;
+  std::vector<Ready> ready(own ? static_cast<std::size_t>(workers) : 1);  // of each worker, or of all
+  std::vector<int> idle(ready.size(), own ? 1 : workers);
+  const auto taker = [&](std::size_t t) { return own ? static_cast<std::size_t>(table.worker()[t]) : std::size_t{0}; };
   using Running = std::pair<double, std::int32_t>;  // when it ends, task
   std::priority_queue<Running, std::vector<Running>, std::greater<>> running;
-  for (std::size_t t = 0; t < count; ++t)
-    if (waits[t] == 0) ready.push(static_cast<std::int32_t>(t));
   Schedule result;
   double now = 0.0;
-  while (!ready.empty() || !running.empty()) {
-    while (!ready.empty() && static_cast<int>(running.size()) < workers) {
-      const auto t = static_cast<std::size_t>(ready.top());
-      ready.pop();
+  const auto begin = [&](std::size_t by) {
+    for (; idle[by] > 0 && !ready[by].empty(); --idle[by]) {
+      const auto t = static_cast<std::size_t>(ready[by].top());
+      ready[by].pop();
       running.push({now + cost[t], static_cast<std::int32_t>(t)});
       result.work += cost[t];
     }
+  };
+  for (std::size_t t = 0; t < count; ++t)
+    if (waits[t] == 0) ready[taker(t)].push(static_cast<std::int32_t>(t));
+  for (std::size_t by = 0; by < ready.size(); ++by) begin(by);
+  while (!running.empty()) {
     const auto [end, task] = running.top();
     running.pop();
     now = end;
     const auto t = static_cast<std::size_t>(task);
     chain[t] += cost[t];
     result.longest = std::max(result.longest, chain[t]);
+    ++idle[taker(t)];
     for (const std::int32_t next : table.successors()[t]) {
       chain[static_cast<std::size_t>(next)] = std::max(chain[static_cast<std::size_t>(next)], chain[t]);
-      if (--waits[static_cast<std::size_t>(next)] == 0) ready.push(next);
+      if (--waits[static_cast<std::size_t>(next)] == 0) ready[taker(static_cast<std::size_t>(next))].push(next);
     }
-    if (!own.empty() && own[t] >= 0 && --waits[static_cast<std::size_t>(own[t])] == 0) ready.push(own[t]);
+    for (std::size_t by = 0; by < ready.size(); ++by) begin(by);
   }
   result.makespan = now;
   return result;

@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "core/worker_needs.h"
+#include "core/worker_tasks.h"
 
 #if defined(__x86_64__) || defined(__i386__)
 #include <immintrin.h>
@@ -29,24 +29,11 @@ void pause() {
 #endif
 }
 
-// How long a thread waits for others before it looks for other work. Neighbours that have a core each are about a task behind.
-constexpr auto patience = std::chrono::microseconds(300);
+// How long a worker waits for others before it takes one of their tasks. Neighbours that have a core each are about a task behind, of 50 us or
+// less; in beds that fit in the caches a task is dear to anybody else.
+constexpr auto patience_in_large_beds = std::chrono::microseconds(100), patience_in_caches = std::chrono::microseconds(300);
 // After so many waits in vain a worker waits no more in this run: something else may have the core of whom it waits for.
 constexpr int most_in_vain = 4;
-
-// Whether `ready` came true.
-template <class Ready>
-bool wait_a_little(const Ready& ready) {
-  if (ready()) return true;
-  const auto start = std::chrono::steady_clock::now();
-  do {
-    for (int k = 0; k < 32; ++k) {
-      pause();
-      if (ready()) return true;
-    }
-  } while (std::chrono::steady_clock::now() - start < patience);
-  return false;
-}
 
 // Threads that may run at once, as far as is known: the arena's, of a process that has been given some cores.
 int most_threads() {
@@ -67,8 +54,8 @@ struct FlowGraph::Graph {
   using Message = tbb::flow::continue_msg;
   using Node = tbb::flow::continue_node<Message>;
   struct alignas(128) Worker {  // on lines of its own
-    std::atomic<std::int32_t> done{0};  // tasks of this run
-    int waits_in_vain = 0;              // of this run
+    std::atomic<bool> away{false};      // must be sent for
+    std::atomic<int> waits_in_vain{0};  // of this run
   };
 
   tbb::flow::graph graph;
@@ -76,19 +63,18 @@ struct FlowGraph::Graph {
   std::vector<Node*> roots;
   TaskBody body;
   int steps = 0;
-  // Where tasks have workers: of each task what it needs of others, and who of others needs it.
-  std::vector<std::vector<Need>> needs;
-  std::vector<std::vector<std::int32_t>> needed_by;
+  // Where tasks have workers.
+  std::unique_ptr<WorkerTasks> tasks;
+  std::vector<Task> table;
   std::vector<Worker> workers;
+  bool waits = false;
+  std::chrono::microseconds patience{};
 
   void run(const Task& task) {
     if (task.offset < steps) body(task);
   }
-  bool others_are_done(std::size_t task) const {
-    for (const Need& need : needs[task])
-      if (workers[static_cast<std::size_t>(need.worker)].done.load(std::memory_order_acquire) < need.done) return false;
-    return true;
-  }
+  std::int32_t wait_for_a_task(std::size_t worker);
+  void work(std::size_t worker);
 };
 
 FlowGraph::FlowGraph(const TaskTable& table, TaskBody body, Takers takers) : graph_(std::make_unique<Graph>()) {
@@ -125,38 +111,68 @@ void FlowGraph::build_for_anybody(const TaskTable& table) {
   }
 }
 
-// The only edges are those from a worker's task to its next one. A task tells those of others that wait for it; then its thread waits a
-// little for what the next one needs of others, so that the chain, whose arrays its caches hold, stays with it. Where that takes too long
-// the thread is free for others, and whoever brings what was missing goes on with the chain, or leaves it to be taken.
+// A worker is a node, which takes task after task. So the worker, whose arrays its caches hold, stays with one thread while it has something to
+// do or may soon have; then the thread is free for others, and whoever does what was missing sends for the worker.
 void FlowGraph::build_for_workers(const TaskTable& table) {
   Graph& g = *graph_;
-  const std::size_t tasks = table.tasks().size();
-  g.needs = needs_of_others(table);
-  g.needed_by.resize(tasks);
-  for (std::size_t t = 0; t < tasks; ++t)
-    for (const Need& need : g.needs[t]) g.needed_by[static_cast<std::size_t>(need.task)].push_back(static_cast<std::int32_t>(t));
-  const int workers = worker_count(table);
-  g.workers = std::vector<Graph::Worker>(static_cast<std::size_t>(workers));
+  g.tasks = std::make_unique<WorkerTasks>(table);
+  g.table = table.tasks();
+  g.workers = std::vector<Graph::Worker>(g.tasks->workers());
   // Where there are more workers than threads the one that is waited for may need this very thread.
-  const bool waits = workers <= most_threads();
-  for (std::size_t t = 0; t < tasks; ++t) {
-    const auto worker = static_cast<std::size_t>(table.worker()[t]);
-    g.nodes.push_back(std::make_unique<Graph::Node>(g.graph, static_cast<int>(g.needs[t].size()),
-        [&g, &own = g.workers[worker], task = table.tasks()[t], t, next = waits ? table.next_of_worker()[t] : -1](const Graph::Message&) {
-      g.run(task);
-      for (const std::int32_t other : g.needed_by[t]) g.nodes[static_cast<std::size_t>(other)]->try_put(Graph::Message());
-      own.done.store(own.done.load(std::memory_order_relaxed) + 1, std::memory_order_release);
-      if (next >= 0 && own.waits_in_vain < most_in_vain && !wait_a_little([&] { return g.others_are_done(static_cast<std::size_t>(next)); })) ++own.waits_in_vain;
+  g.waits = static_cast<int>(g.workers.size()) <= most_threads();
+  g.patience = table.ordered() ? patience_in_large_beds : patience_in_caches;
+  for (std::size_t w = 0; w < g.workers.size(); ++w) {
+    g.nodes.push_back(std::make_unique<Graph::Node>(g.graph, [&g, w](const Graph::Message&) {
+      g.work(w);
       return Graph::Message();
     }));
+    g.roots.push_back(g.nodes.back().get());
   }
-  std::vector<bool> first(tasks, true);
-  for (std::size_t t = 0; t < tasks; ++t) {
-    if (const std::int32_t next = table.next_of_worker()[t]; next >= 0) {
-      tbb::flow::make_edge(*g.nodes[t], *g.nodes[static_cast<std::size_t>(next)]);
-      first[static_cast<std::size_t>(next)] = false;
+}
+
+// A task that can go on, after a while one of another worker's; -1 where there is none.
+std::int32_t FlowGraph::Graph::wait_for_a_task(std::size_t worker) {
+  std::int32_t task = tasks->take(worker);
+  if (task >= 0 || !waits) return task;
+  auto& in_vain = workers[worker].waits_in_vain;
+  const bool patient = in_vain.load(std::memory_order_relaxed) < most_in_vain;
+  const auto start = std::chrono::steady_clock::now();
+  while (tasks->have_left()) {
+    for (int k = 0; k < 32; ++k) {
+      pause();
+      if (task = tasks->take(worker); task >= 0) return task;
     }
-    if (first[t] && g.needs[t].empty()) g.roots.push_back(g.nodes[t].get());
+    const auto waited = std::chrono::steady_clock::now() - start;
+    if (patient && waited < patience) continue;
+    if (task = tasks->take_from_others(worker); task >= 0) return task;
+    if (patient && waited < 2 * patience) continue;
+    in_vain.fetch_add(1, std::memory_order_relaxed);
+    break;
+  }
+  return -1;
+}
+
+void FlowGraph::Graph::work(std::size_t worker) {
+  for (bool sent_for = false; !sent_for;) {
+    std::int32_t task = wait_for_a_task(worker);
+    if (task < 0) {
+      if (!tasks->has_left(worker)) return;
+      // Either what is missing is seen here, or who brings it sees that this worker is away.
+      std::atomic<bool>& away = workers[worker].away;
+      away.store(true, std::memory_order_relaxed);
+      std::atomic_thread_fence(std::memory_order_seq_cst);
+      task = tasks->take(worker);
+      if (task < 0) return;
+      sent_for = !away.exchange(false, std::memory_order_relaxed);  // then the worker goes on elsewhere, and only this task is done here
+    }
+    run(table[static_cast<std::size_t>(task)]);
+    tasks->done(task);
+    std::atomic_thread_fence(std::memory_order_seq_cst);
+    for (const std::int32_t number : tasks->who_waits_for(task)) {
+      const auto other = static_cast<std::size_t>(number);
+      std::atomic<bool>& away = workers[other].away;
+      if (away.load(std::memory_order_relaxed) && tasks->can_take(other) && away.exchange(false, std::memory_order_relaxed)) nodes[other]->try_put(Message());
+    }
   }
 }
 
@@ -164,7 +180,8 @@ FlowGraph::~FlowGraph() = default;
 
 void FlowGraph::run(int steps) {
   graph_->steps = steps;
-  for (Graph::Worker& worker : graph_->workers) worker.done.store(0, std::memory_order_relaxed), worker.waits_in_vain = 0;
+  if (graph_->tasks) graph_->tasks->start();
+  for (Graph::Worker& worker : graph_->workers) worker.away.store(false, std::memory_order_relaxed), worker.waits_in_vain.store(0, std::memory_order_relaxed);
   for (Graph::Node* root : graph_->roots) root->try_put(Graph::Message());
   graph_->graph.wait_for_all();
 }

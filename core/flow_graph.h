@@ -10,7 +10,7 @@ namespace platen {
 // Who takes which task of a flow graph.
 enum class Takers {
   anybody,  // whoever is free takes whatever is ready; a thread goes on with the batch that it has, if it can
-  workers   // the table says [TaskTable::worker]: a worker's tasks are a chain, which in a run stays with one thread while nothing holds it up
+  workers   // the table says [TaskTable::worker]: in a run each worker stays with one thread while nothing holds it up [core/worker_tasks.h]
 };
 
 // Built once and run many times, until a task throws. Build and run it inside the arena that shall work.

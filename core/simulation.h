@@ -181,7 +181,8 @@ class Simulation {
   void keep_sums(AlignedArray<double>& sums);
   void put_sums(const AlignedArray<double>& sums);
   LookTotals look_at(const AlignedArray<double>& margins);
-  AlignedArray<double> own_speeds() const;
+  AlignedArray<double> own_speeds();
+  double sum_of(const AlignedArray<double>& column);
   double own_speed(std::size_t k) const;
   void choose_horizon();
   double widest_margin() const;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "core/float_mode.h"
 #include "core/morton_order.h"
@@ -57,9 +58,12 @@ void Simulation::put_sums(const AlignedArray<double>& sums) {
 void Simulation::start_from_here() {
   const auto n = static_cast<std::size_t>(particles_.count);
   at_prune_.resize(3 * n + padding);  // whole vectors may be read
-  std::copy_n(particles_.x.data(), n, at_prune_.data());
-  std::copy_n(particles_.y.data(), n, at_prune_.data() + n);
-  std::copy_n(particles_.z.data(), n, at_prune_.data() + 2 * n);
+  parallel(stretches_of(n), [&](int part) {
+    const IndexRange range = stretch(n, part);
+    std::size_t axis = 0;
+    for (const auto* column : {&particles_.x, &particles_.y, &particles_.z})
+      std::copy_n(column->data() + range.first, range.last - range.first, at_prune_.data() + axis++ * n + range.first);
+  });
   std::fill(drift_at_prune_, drift_at_prune_ + 3, 0.0);
   plane_moved_ = 0.0;
   moved_since_prune_ = false;
@@ -110,10 +114,10 @@ double Simulation::plane_path(int steps) const {
 // How long lists should hold [steps]. Longer means wider margins, hence more pairs in every step, and fewer prunes:
 // the cheapest is where both cost the same.
 void Simulation::choose_horizon() {
-  double listed = 0.0, outer = 0.0, margin = 0.0;
+  double listed = 0.0, outer = 0.0;
   for (const Batch& b : batches_) listed += b.used, outer += static_cast<double>(b.outer_j.size());
   const auto n = static_cast<std::size_t>(particles_.count);
-  for (std::size_t k = 0; k < n; ++k) margin += inner_.of[k];
+  const double margin = inner_.of.empty() ? 0.0 : sum_of(inner_.of);
   if (n == 0 || !(margin > 0.0)) return;
   const double least = smallest_inner * largest_radius_ * static_cast<double>(n);
   const double widened = (listed - static_cast<double>(contacts_)) * std::max(0.0, margin - least) / margin;
@@ -134,11 +138,27 @@ double Simulation::widest_margin() const {
 // Margin without which a sphere of this speed could not take a single step [m].
 double Simulation::least_margin(double speed) const { return 1.01 * (caution * speed + gravity_ * dt_) * dt_; }
 
-AlignedArray<double> Simulation::own_speeds() const {
+AlignedArray<double> Simulation::own_speeds() {
   AlignedArray<double> speeds;
   speeds.resize(static_cast<std::size_t>(particles_.count));
-  for (std::size_t k = 0; k < speeds.size(); ++k) speeds[k] = own_speed(k);
+  for_each_in_stretches(speeds.size(), on_workers(), [&](std::size_t k) { speeds[k] = own_speed(k); });
   return speeds;
+}
+
+// Sum over the spheres in a fixed order, whoever adds which part.
+double Simulation::sum_of(const AlignedArray<double>& column) {
+  const auto n = static_cast<std::size_t>(particles_.count);
+  std::vector<double> sums(static_cast<std::size_t>(stretches_of(n)));
+  parallel(stretches_of(n), [&](int part) {
+    const IndexRange range = stretch(n, part);
+    double four[4] = {0.0, 0.0, 0.0, 0.0};  // side by side: an addition would wait for the one before
+    std::size_t k = range.first;
+    for (; k + 4 <= range.last; k += 4)
+      for (std::size_t lane = 0; lane < 4; ++lane) four[lane] += column[k + lane];
+    for (; k < range.last; ++k) four[0] += column[k];
+    sums[static_cast<std::size_t>(part)] = (four[0] + four[1]) + (four[2] + four[3]);
+  });
+  return std::accumulate(sums.begin(), sums.end(), 0.0);
 }
 
 // Ends the run where a sphere is too fast for any list. Looked for before lists are touched: what a failure tells, and
@@ -161,36 +181,48 @@ bool Simulation::choose_margins(bool fresh, const AlignedArray<double>& speeds) 
   if (!fresh) look_at(outer_.of);
   // Who is slow may be hit: a sphere's margin is never below what the mean speed, times a factor that grows whenever
   // steps had to be done again, takes.
-  double mean_speed = 0.0;
-  for (std::size_t k = 0; k < n; ++k) mean_speed += speeds[k];
-  const double least_path = n > 0 ? caution * kick_factor_ * mean_speed / static_cast<double>(n) * dt_ : 0.0;
+  const double least_path = n > 0 ? caution * kick_factor_ * sum_of(speeds) / static_cast<double>(n) * dt_ : 0.0;
   kick_factor_ = std::max(1.0, 0.97 * kick_factor_);
-  bool enough = true;
-  double inner_sum = 0.0, outer_sum = 0.0;
-  inner_.largest = 0.0;
-  if (fresh) outer_.largest = 0.0;
-  for (std::size_t k = 0; k < n; ++k) {
-    const double now = caution * speeds[k] * dt_, path = std::max(now, least_path);  // of one step
-    const double needed = least_margin(speeds[k]);
-    const double wish = engine_.inner_gap > 0.0 ? 0.5 * engine_.inner_gap : std::max(smallest_inner * R, horizon_ * path);
-    double inner = std::min(std::max({wish, redo_margin_, needed}), most);
-    if (fresh) {
-      const double further = engine_.skin > 0.0 ? 0.5 * engine_.skin : inner + std::max(smallest_outer * R, outer_life * horizon_ * path);
-      outer_.of[k] = std::clamp(further, inner, most);
-      outer_sum += outer_.of[k], outer_.largest = std::max(outer_.largest, outer_.of[k]);
-    } else {
-      const double left = room_[k];  // enough if it lasts for some steps
-      enough = enough && left > 0.0 && left >= std::max({std::min(inner, worthwhile * path), std::min(redo_margin_, most), needed});
-      inner = std::min(inner, left);
+  struct Found {
+    double inner_sum = 0.0, outer_sum = 0.0, inner_largest = 0.0, outer_largest = 0.0;
+    bool enough = true;
+  };
+  std::vector<Found> found(static_cast<std::size_t>(stretches_of(n)));
+  parallel(stretches_of(n), [&](int part) {
+    const IndexRange range = stretch(n, part);
+    Found now;
+    for (std::size_t k = range.first; k < range.last; ++k) {
+      const double path = std::max(caution * speeds[k] * dt_, least_path);  // of one step
+      const double needed = least_margin(speeds[k]);
+      const double wish = engine_.inner_gap > 0.0 ? 0.5 * engine_.inner_gap : std::max(smallest_inner * R, horizon_ * path);
+      double inner = std::min(std::max({wish, redo_margin_, needed}), most);
+      if (fresh) {
+        const double further = engine_.skin > 0.0 ? 0.5 * engine_.skin : inner + std::max(smallest_outer * R, outer_life * horizon_ * path);
+        outer_.of[k] = std::clamp(further, inner, most);
+        now.outer_sum += outer_.of[k], now.outer_largest = std::max(now.outer_largest, outer_.of[k]);
+      } else {
+        const double left = room_[k];  // enough if it lasts for some steps
+        now.enough = now.enough && left > 0.0 && left >= std::max({std::min(inner, worthwhile * path), std::min(redo_margin_, most), needed});
+        inner = std::min(inner, left);
+      }
+      inner_.of[k] = inner;
+      now.inner_sum += inner, now.inner_largest = std::max(now.inner_largest, inner);
     }
-    inner_.of[k] = inner;
-    inner_sum += inner, inner_.largest = std::max(inner_.largest, inner);
+    found[static_cast<std::size_t>(part)] = now;
+  });
+  Found all;
+  for (const Found& of : found) {
+    all.inner_sum += of.inner_sum, all.inner_largest = std::max(all.inner_largest, of.inner_largest);
+    all.outer_sum += of.outer_sum, all.outer_largest = std::max(all.outer_largest, of.outer_largest);
+    all.enough = all.enough && of.enough;
   }
-  if (n > 0) counters_.gap = 2.0 * inner_sum / static_cast<double>(n);
-  if (n > 0 && fresh) counters_.skin = 2.0 * outer_sum / static_cast<double>(n);
+  inner_.largest = all.inner_largest;
+  if (fresh) outer_.largest = all.outer_largest;
+  if (n > 0) counters_.gap = 2.0 * all.inner_sum / static_cast<double>(n);
+  if (n > 0 && fresh) counters_.skin = 2.0 * all.outer_sum / static_cast<double>(n);
   plate_gap_ = std::max(0.05 * R, 1.5 * plane_path(horizon_));
-  if (!fresh && enough) outer_.of.swap(room_);
-  return enough;
+  if (!fresh && all.enough) outer_.of.swap(room_);
+  return all.enough;
 }
 
 // Sets the room that each sphere has left of the margin that it had at the last prune.

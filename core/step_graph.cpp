@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <thread>
 
+#include "core/worker_tasks.h"
+
 namespace platen {
 
 const char* to_string(TaskKind kind) {
@@ -114,17 +116,7 @@ void TaskTable::reorder(const TaskOrder& order) {
   give_to(order.worker);
 }
 
-void TaskTable::give_to(std::vector<std::int32_t> workers) {
-  worker_ = std::move(workers);
-  next_of_worker_.assign(worker_.size(), -1);
-  std::vector<std::int32_t> next;  // of each worker, from the end on
-  for (std::size_t k = worker_.size(); k-- > 0;) {
-    const auto worker = static_cast<std::size_t>(worker_[k]);
-    if (worker >= next.size()) next.resize(worker + 1, -1);
-    next_of_worker_[k] = next[worker];
-    next[worker] = static_cast<std::int32_t>(k);
-  }
-}
+void TaskTable::give_to(std::vector<std::int32_t> workers) { worker_ = std::move(workers); }
 
 int worker_count(const TaskTable& table) {
   return table.worker().empty() ? 0 : *std::max_element(table.worker().begin(), table.worker().end()) + 1;
@@ -161,7 +153,34 @@ void run_serially(const TaskTable& table, int steps, const TaskBody& body) {
   }
 }
 
+namespace {
+
+// As the flow graph does it, but for sending for those who are away.
+void run_by_workers_on_plain_threads(const TaskTable& table, int steps, const TaskBody& body) {
+  WorkerTasks tasks(table);
+  std::vector<std::thread> team;
+  for (std::size_t worker = 0; worker < tasks.workers(); ++worker) {
+    team.emplace_back([&, worker] {
+      while (tasks.have_left()) {
+        std::int32_t t = tasks.take(worker);
+        if (t < 0) t = tasks.take_from_others(worker);
+        if (t < 0) {
+          std::this_thread::yield();
+          continue;
+        }
+        const Task& task = table.tasks()[static_cast<std::size_t>(t)];
+        if (task.offset < steps) body(task);
+        tasks.done(t);
+      }
+    });
+  }
+  for (std::thread& thread : team) thread.join();
+}
+
+}  // namespace
+
 void run_on_plain_threads(const TaskTable& table, int steps, const TaskBody& body, int threads) {
+  if (!table.worker().empty()) return run_by_workers_on_plain_threads(table, steps, body);
   const std::size_t count = table.tasks().size();
   std::vector<std::vector<std::int32_t>> before(count);
   for (std::size_t t = 0; t < count; ++t)

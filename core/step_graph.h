@@ -2,7 +2,7 @@
 //
 // The table is written down once in the order of the steps. Two tasks that touch the same resource,
 // at least one of them writing, keep that order: edges are derived, nobody writes them. It may be put into another order that keeps all edges; then one
-// thread takes the tasks as they come, more take the first that is ready, or each the next of its own. The same table runs serially,
+// thread takes the tasks as they come, more take the first that is ready, or each the first of its own. The same table runs serially,
 // as an oneTBB flow graph [core/flow_graph.h], or on plain threads that wait on their predecessors' flags (for ThreadSanitizer, which cannot
 // see through an uninstrumented libtbb).
 #pragma once
@@ -59,9 +59,8 @@ class TaskTable {
   bool ordered() const { return ordered_; }
   void reorder(const TaskOrder& order);  // must keep all edges
   void give_to(std::vector<std::int32_t> workers);  // of each task; a worker takes its own in the table's order
-  // Of each task, who takes it and which one that worker takes next, or -1; empty where no worker has a part of the bed.
+  // Of each task who takes it; empty where no worker has a part of the bed.
   const std::vector<std::int32_t>& worker() const { return worker_; }
-  const std::vector<std::int32_t>& next_of_worker() const { return next_of_worker_; }
   std::vector<Access> accesses(const Task& task) const;
   void remove_edge(std::int32_t from, std::int32_t to);  // for tests that must see it missed
   std::string to_dot() const;                            // Graphviz
@@ -72,7 +71,7 @@ class TaskTable {
   std::vector<std::vector<int>> partners_, owners_;  // of each batch
   std::vector<Task> tasks_;
   std::vector<std::vector<std::int32_t>> successors_;
-  std::vector<std::int32_t> predecessors_, worker_, next_of_worker_;
+  std::vector<std::int32_t> predecessors_, worker_;
 };
 
 // How many workers the tasks have; 0 where any worker may take any task.
@@ -82,7 +81,7 @@ std::vector<int> worker_of_batches(const TaskTable& table, std::size_t batches);
 
 using TaskBody = std::function<void(const Task&)>;
 
-// Runs the tasks of the first `steps` steps of the table.
+// Runs the tasks of the first `steps` steps of the table. On plain threads those of workers are taken by a thread for each, whatever `threads` is.
 void run_serially(const TaskTable& table, int steps, const TaskBody& body);
 void run_on_plain_threads(const TaskTable& table, int steps, const TaskBody& body, int threads);
 

@@ -33,6 +33,21 @@ std::vector<int> parts_of(const std::vector<Batch>& batches, int workers, Cut cu
   return worker;
 }
 
+// Spheres of each batch that two workers have to do with: what its contacts read and add to of others', what it takes in of its own.
+struct Abroad {
+  std::vector<std::int64_t> read, taken;
+};
+Abroad abroad_of(const std::vector<Batch>& batches, const std::vector<int>& worker) {
+  Abroad of{std::vector<std::int64_t>(batches.size(), 0), std::vector<std::int64_t>(batches.size(), 0)};
+  for (std::size_t b = 0; b < batches.size(); ++b)
+    for (const Incoming& in : batches[b].incoming) {
+      const auto from = static_cast<std::size_t>(in.batch);
+      if (worker[from] == worker[b]) continue;
+      of.read[from] += in.count, of.taken[b] += in.count;
+    }
+  return of;
+}
+
 double mean_pairs(const std::vector<Batch>& batches) {
   double sum = 0.0;
   for (const Batch& b : batches) sum += b.padded;
@@ -44,7 +59,7 @@ class Planner {
  public:
   Planner(const TaskTable& table, const std::vector<Batch>& batches, double bytes, int workers, Cut cut, double phase_weighs)
       : phase_weighs_(phase_weighs), table_(table), batches_(batches), waits_(table.predecessors()), ready_(batches.size(), -1), worker_(parts_of(batches, workers, cut)),
-        caches_(batches, worker_, bytes), ready_tasks_(static_cast<std::size_t>(workers), 0),
+        abroad_(abroad_of(batches, worker_)), caches_(batches, worker_, bytes), ready_tasks_(static_cast<std::size_t>(workers), 0),
         late_(mean_pairs(batches)), mean_(touched_bytes(batches) / (2.0 * static_cast<double>(std::max<std::size_t>(batches.size(), 1)))) {
     for (std::size_t t = 0; t < waits_.size(); ++t)
       if (waits_[t] == 0) set_free(static_cast<std::int32_t>(t));
@@ -97,10 +112,15 @@ class Planner {
     caches_.use(task(t));
     return missing;
   }
-  // A contact takes about twice as long as a sphere's motion, and as 300 bytes from memory.
+  // A contact takes about twice as long as a sphere's motion, and as 300 bytes from memory; what another core wrote last takes as long as
+  // three contacts with each sphere whose row is read, and as two with each share that is added [docs/decisions.md, "Borders have a price"].
   double time_of(const Task& t, double missing) const {
-    const Batch& b = batches_[static_cast<std::size_t>(t.batch)];
-    return (t.kind == TaskKind::integrate ? 0.0 : b.padded) + (t.kind == TaskKind::contacts ? 0.0 : 0.5 * b.count) + 0.003 * missing;
+    const auto index = static_cast<std::size_t>(t.batch);
+    const Batch& b = batches_[index];
+    double time = 0.003 * missing;
+    if (t.kind != TaskKind::integrate) time += b.padded + 3.0 * static_cast<double>(abroad_.read[index]);
+    if (t.kind != TaskKind::contacts) time += 0.5 * b.count + 2.0 * static_cast<double>(abroad_.taken[index]);
+    return time;
   }
   std::int32_t best_of(std::size_t w) const {
     // Weights against the mean bytes of half a batch, its state or its contacts. Found by trying on beds of 280,000 and a million
@@ -128,6 +148,7 @@ class Planner {
   std::vector<std::int32_t> waits_;   // for how many each task still waits
   std::vector<std::int32_t> ready_;   // task of each batch that may begin, or -1
   std::vector<int> worker_;           // of each batch
+  const Abroad abroad_;
   CacheModel caches_;
   std::vector<int> ready_tasks_;      // of each worker
   // Other workers count on a task this much later, about the time of one: what takes longer than foreseen then keeps nobody waiting.

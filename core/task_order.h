@@ -36,7 +36,7 @@ double bytes_from_memory(const TaskTable& table, const std::vector<Batch>& batch
 //
 // Several workers have a part of the bed each, of equally many bytes, and a cache of their own: cores do
 // not always share one. Each has its own sequence of tasks; one waits for another's only at the border of their parts, and who
-// would have to wait how long is foreseen by the time that tasks should take. By the same forecast the parts are chosen: slabs across an
+// would have to wait how long is foreseen by the time that tasks should take, longer at a border. By the same forecast the parts are chosen: slabs across an
 // axis, or stretches of the curve. With one worker tasks are anybody's.
 TaskOrder order_for_cache(const TaskTable& table, const std::vector<Batch>& batches, double bytes, int workers = 1, const ParallelFor& parallel = in_turn);
 
