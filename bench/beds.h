@@ -42,6 +42,7 @@ Bed rain_bed(std::int64_t particles, const std::filesystem::path& cache);
 struct BenchScene {
   std::string name;
   PairLaw law;
+  PlateLaw plate;
   double spread = 0.0;  // of radii: (1 - spread) R to R
   bool plates = true;   // bottom and top plate, the top one moving down with 10 mm/s
   bool top = true;      // false: no top plate (rain)

@@ -31,7 +31,9 @@ std::vector<BenchScene> bench_scenes() {
   const auto as_it_is = [](BenchScene&) {};
   const PairLaw full = full_law();
   add("full", full, as_it_is);
-  add("linear", linear_law(), as_it_is);
+  // Neither spheres nor plates brake spins: as the peers' decks have it [bench/peers/lammps.in].
+  const auto no_rolling = [](BenchScene& s) { s.plate.rolling_friction = 0.0; };
+  add("linear", linear_law(), no_rolling);
   PairLaw cohesionless = full;
   cohesionless.k_adh = cohesionless.f0 = 0.0;
   add("no_adhesion", cohesionless, as_it_is);
@@ -42,7 +44,7 @@ std::vector<BenchScene> bench_scenes() {
   not_rolling.rolling_friction = 0.0;
   add("no_rolling", not_rolling, as_it_is);
   add("no_energy", full, [](BenchScene& s) { s.energy = false; });
-  add("linear_no_energy", linear_law(), [](BenchScene& s) { s.energy = false; });
+  add("linear_no_energy", linear_law(), [&](BenchScene& s) { s.energy = false, no_rolling(s); });
   add("no_plates", full, [](BenchScene& s) { s.plates = false, s.gravity = 0.0; });
   add("open", full, [](BenchScene& s) { s.periodic = false; });
   add("walls", full, [](BenchScene& s) { s.periodic = false, s.walls = true; });
@@ -63,10 +65,10 @@ std::vector<BenchScene> bench_scenes() {
   relative.rolling_model = RollingModel::relative;
   add("relative_rolling", relative, as_it_is);
   add("reproducible", full, [](BenchScene& s) { s.reproducible = true; });
-  const auto rain = [](BenchScene& s) { s.top = false; };
+  const auto rain = [&](BenchScene& s) { s.top = false, no_rolling(s); };
   add("rain", linear_law(), rain);
-  add("rain_no_energy", linear_law(), [](BenchScene& s) { s.top = false, s.energy = false; });
-  add("rain_full", full, rain);
+  add("rain_no_energy", linear_law(), [&](BenchScene& s) { rain(s), s.energy = false; });
+  add("rain_full", full, [](BenchScene& s) { s.top = false; });
   return all;
 }
 
@@ -81,7 +83,7 @@ BenchScene bench_scene(const std::string& name) {
 
 std::unique_ptr<Simulation> make_simulation(const Bed& bed, const BenchScene& scene, const BenchEngine& engine) {
   SimulationSetup setup;
-  setup.pair = scene.law;
+  setup.pair = scene.law, setup.plate = scene.plate;
   setup.gravity = scene.gravity;
   setup.width = bed.width, setup.depth = bed.depth;
   setup.periodic = scene.periodic;

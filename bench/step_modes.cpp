@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <thread>
 
 #include "bench/parallel_for_step.h"
 #include "bench/reference_loops.h"
@@ -59,6 +60,17 @@ void add_time(nlohmann::json& row, Simulation& sim, const Timing& timing, std::i
 }
 
 std::string hash_of(Simulation& sim) { return fmt::format("{:016x}", sim.state_hash()); }
+
+// Beds that have nothing to do with each other, each on a thread of its own: what as many cores make of each other's caches and memory.
+Variant side_by_side(const std::string& name, std::vector<Simulation*> sims, std::int64_t steps) {
+  return {name, [sims = std::move(sims), steps] {
+            return seconds_of([&] {
+              std::vector<std::thread> team;
+              for (Simulation* sim : sims) team.emplace_back([sim, steps] { sim->advance(steps); });
+              for (std::thread& thread : team) thread.join();
+            });
+          }};
+}
 
 Variant stepping(const std::string& name, Simulation& sim, std::int64_t steps) {
   return {name, [&sim, steps] { return seconds_of([&] { sim.advance(steps); }); }};
@@ -130,6 +142,7 @@ void table_of_threads(const StepOptions& o) {
                                                           {"rate_one", "M/s, 1"},
                                                           {"rate", "M/s, many", 11},
                                                           {"speedup", "speed-up"},
+                                                          {"apart", "side by side", 13},
                                                           {"rounds", "pairs", 7, 0},
                                                           {"dropped", "dropped", 9, 0},
                                                           {"same", "same bits"},
@@ -147,14 +160,22 @@ void table_of_threads(const StepOptions& o) {
       const BenchScene scene = bench_scene("full");
       const auto one = make_simulation(bed, scene, engine_of(o, set, 1));
       const auto team = make_simulation(bed, scene, engine_of(o, set, many));
+      std::vector<std::unique_ptr<Simulation>> others;
+      std::vector<Simulation*> apart = {one.get()};
+      for (int k = 1; k < many; ++k) {
+        others.push_back(make_simulation(bed, scene, engine_of(o, set, 1)));
+        others.back()->advance(o.warm);
+        apart.push_back(others.back().get());
+      }
       one->advance(o.warm), team->advance(o.warm);
       const bool same = one->state_hash() == team->state_hash();
       const std::int64_t steps = steps_of(o, bed.size());
-      const auto timings = run_in_turn({stepping("one", *one, steps), stepping("many", *team, steps)}, o.rounds);
+      const auto timings = run_in_turn({stepping("one", *one, steps), stepping("many", *team, steps), side_by_side("apart", apart, steps)}, o.rounds);
       nlohmann::json row = row_of(*team, scene, many);
       add_time(row, *team, timings[1], steps, many);
       row["rate_one"] = rate(bed.size(), steps, timings[0].typical());
       row["speedup"] = median_ratio(timings[0], timings[1]);
+      row["apart"] = many * median_ratio(timings[0], timings[2]);
       row["same"] = same;
       add_reference(row, set);
       table.add(row);

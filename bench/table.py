@@ -57,8 +57,8 @@ def make(folder):
     rows = rows_of(folder, "threads")
     if rows:
         parts.append("### One thread against many\n\n" + table(
-            ("particles", "threads", "M/s, one", "M/s, many", "speed-up (asked 1.75 on 2)", "pairs", "dropped", "same bits", "FMA / L2 / L3 / between cores"),
-            [(f"{r['particles']:,}", r["threads"], number(r["rate_one"]), number(r["rate"]), number(r["speedup"], 2), r["rounds"],
+            ("particles", "threads", "M/s, one", "M/s, many", "speed-up (asked 1.75 on 2)", "as many beds side by side", "pairs", "dropped", "same bits", "FMA / L2 / L3 / between cores"),
+            [(f"{r['particles']:,}", r["threads"], number(r["rate_one"]), number(r["rate"]), number(r["speedup"], 2), number(r["apart"], 2) if "apart" in r else "-", r["rounds"],
               r["dropped"], "yes" if r["same"] else "NO", state(r)) for r in rows]))
     rows = rows_of(folder, "executors")
     if rows:

@@ -29,9 +29,9 @@ void pause() {
 #endif
 }
 
-// How long a worker waits for others before it takes one of their tasks. Neighbours that have a core each are about a task behind, of 50 us or
+// How long a worker waits for others before it takes one of their tasks. Neighbours that have a core each are about a task behind, of some 50 us or
 // less; in beds that fit in the caches a task is dear to anybody else.
-constexpr auto patience_in_large_beds = std::chrono::microseconds(100), patience_in_caches = std::chrono::microseconds(300);
+constexpr auto patience_in_large_beds = std::chrono::microseconds(50), patience_in_caches = std::chrono::microseconds(300);
 // After so many waits in vain a worker waits no more in this run: something else may have the core of whom it waits for.
 constexpr int most_in_vain = 4;
 
