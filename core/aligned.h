@@ -46,6 +46,11 @@ class AlignedArray {
     if (size > size_) std::fill(data_ + size_, data_ + size, T{});
     size_ = size;
   }
+  // The same, but those from the old size on have no value yet.
+  void resize_to_overwrite(std::size_t size) {
+    reserve(size);
+    size_ = size;
+  }
   void assign(std::size_t size, T value) {
     size_ = 0;
     reserve(size);

@@ -122,6 +122,14 @@ HugePool& pool() {
 
 }  // namespace
 
+void* take_huge_pages(std::size_t bytes) {
+  const bool large = bytes >= huge_page;  // smaller only where nothing is pooled
+  const std::size_t alignment = large ? huge_page : 64;
+  void* memory = std::aligned_alloc(alignment, (std::max<std::size_t>(bytes, 1) + alignment - 1) / alignment * alignment);
+  if (memory == nullptr) throw std::bad_alloc();
+  if (large) madvise(memory, bytes, MADV_HUGEPAGE);  // a wish: without huge pages everything still works
+  return memory;
+}
 PoolBlock take_from_pool(std::size_t bytes) { return pool().take(bytes); }
 void give_to_pool(const PoolBlock& block) noexcept { pool().give(block); }
 PoolUse pool_use() { return pool().use(); }

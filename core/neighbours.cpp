@@ -61,6 +61,9 @@ class CellGrid {
     for (std::size_t c = 1; c < start_.size(); ++c) start_[c] += start_[c - 1];
     for (auto* column : {&x_, &y_, &z_, &reach_, &number_}) column->resize(static_cast<std::size_t>(p.count + padding));
     particle_.resize(static_cast<std::size_t>(p.count + padding));
+    // Whole vectors are read beyond the last.
+    for (auto* column : {&x_, &y_, &z_, &reach_, &number_}) std::fill_n(column->end() - padding, padding, 0.0);
+    std::fill_n(particle_.end() - padding, padding, 0);
     PooledVector<std::int32_t> next(start_.begin(), start_.end() - 1);
     for (std::int32_t k = 0; k < p.count; ++k) {
       const double* row = p.rows.data() + row_size * static_cast<std::size_t>(k);

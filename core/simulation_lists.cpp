@@ -32,7 +32,7 @@ void Simulation::merge_all() {
 
 // Total of each particle's sums, by rank: forces outlive the batches they were found with.
 void Simulation::keep_sums(AlignedArray<double>& sums) {
-  sums.resize(static_cast<std::size_t>(particles_.count) * record_size);
+  sums.resize_to_overwrite(static_cast<std::size_t>(particles_.count) * record_size);
   merge_all();
   parallel(static_cast<int>(batches_.size()), [&](int k) {
     const Batch& b = batches_[static_cast<std::size_t>(k)];
@@ -140,7 +140,7 @@ double Simulation::least_margin(double speed) const { return 1.01 * (caution * s
 
 AlignedArray<double> Simulation::own_speeds() {
   AlignedArray<double> speeds;
-  speeds.resize(static_cast<std::size_t>(particles_.count));
+  speeds.resize_to_overwrite(static_cast<std::size_t>(particles_.count));
   for_each_in_stretches(speeds.size(), on_workers(), [&](std::size_t k) { speeds[k] = own_speed(k); });
   return speeds;
 }
@@ -464,11 +464,11 @@ void Simulation::open_sides() {
 
 void Simulation::make_room_to_save() {
   Saved& s = *saved_;
-  for (auto* column : {&s.x, &s.y, &s.z, &s.vx, &s.vy, &s.vz, &s.ux, &s.uy, &s.uz}) column->resize(particles_.x.size());
-  s.image.resize(particles_.image.size());
+  for (auto* column : {&s.x, &s.y, &s.z, &s.vx, &s.vy, &s.vz, &s.ux, &s.uy, &s.uz}) column->resize_to_overwrite(particles_.x.size());
+  s.image.resize_to_overwrite(particles_.image.size());
   s.batches.resize(batches_.size());
   parallel(static_cast<int>(batches_.size()), [&](int k) {
-    for_each_history(batches_[static_cast<std::size_t>(k)], [&](std::size_t size) { s.batches[static_cast<std::size_t>(k)].history.resize(size); },
+    for_each_history(batches_[static_cast<std::size_t>(k)], [&](std::size_t size) { s.batches[static_cast<std::size_t>(k)].history.resize_to_overwrite(size); },
                      [](double*, std::size_t, std::size_t) {});
   });
 }

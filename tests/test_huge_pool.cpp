@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <numeric>
 #include <random>
 #include <set>
 #include <thread>
@@ -128,6 +129,45 @@ TEST(AlignedArray, RenewsInMemoryOfItsLength) {
   a.renew(60000, 4.0);
   EXPECT_LT(a.capacity(), 61000u);
   EXPECT_TRUE(std::all_of(a.begin(), a.end(), [](double v) { return v == 4.0; }));
+}
+
+// Some that the pool has and some that are too large for it.
+TEST(AlignedArray, KeepsItsContentAtEverySize) {
+  AlignedArray<double> a;
+  std::size_t known = 0;
+  const auto is_kept = [&] {
+    for (std::size_t k = 0; k < known; ++k)
+      if (a[k] != static_cast<double>(k)) return false;
+    return true;
+  };
+  for (const std::size_t size : {100u, 200000u, 3000000u, 5000000u}) {
+    a.resize(size);
+    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(a.data()) % 64, 0u);
+    EXPECT_TRUE(is_kept());
+    EXPECT_TRUE(std::all_of(a.begin() + static_cast<std::ptrdiff_t>(known), a.end(), [](double v) { return v == 0.0; }));
+    for (std::size_t k = known; k < size; ++k) a[k] = static_cast<double>(k);
+    known = size;
+    a.resize_to_overwrite(size + size / 2);
+    EXPECT_EQ(a.size(), size + size / 2);
+    EXPECT_TRUE(is_kept());
+    a.resize_to_overwrite(size);
+  }
+}
+
+TEST(PooledVector, KeepsItsContentAtEverySize) {
+  for (const std::size_t size : {100u, 200000u, 3000000u}) {
+    PooledVector<std::int64_t> v(size, 7);
+    EXPECT_TRUE(std::all_of(v.begin(), v.end(), [](std::int64_t x) { return x == 7; }));
+    v.resize(2 * size);  // what is new has no value yet
+    EXPECT_TRUE(std::all_of(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(size), [](std::int64_t x) { return x == 7; }));
+    std::iota(v.begin(), v.end(), 0);
+    const PooledVector<std::int64_t> copy = v;
+    v.resize(size), v.shrink_to_fit();
+    v.push_back(-1);
+    EXPECT_EQ(v.back(), -1);
+    EXPECT_TRUE(std::equal(v.begin(), v.end() - 1, copy.begin()));
+    EXPECT_EQ(copy.back(), static_cast<std::int64_t>(2 * size - 1));
+  }
 }
 
 }  // namespace
