@@ -50,7 +50,7 @@ int main(int argc, char** argv) {
   options.beds = std::filesystem::temp_directory_path() / "platen-bench-beds";
   for (const auto& [name, what] : std::vector<std::pair<std::string, std::string>>{
            {"steps", "numbers of particles x scenes x instruction sets x threads"},
-           {"pairs", "one thread against many, in interleaved pairs"},
+           {"pairs", "one thread against many, in interleaved pairs; as many beds side by side"},
            {"features", "time of every scene over that of the full one"},
            {"scalar", "against a plain scalar half-list step, checked to agree"},
            {"executors", "flow graph against two parallel_for a step"},

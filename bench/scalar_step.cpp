@@ -23,7 +23,7 @@ ScalarStep::ScalarStep(const Bed& bed, const BenchScene& scene) {
   if (!scene.periodic || scene.spread != 0.0 || law.exponent != 1.0 || law.rolling_model != RollingModel::absolute)
     throw std::invalid_argument("the scalar step has periodic sides, equal spheres, exponent 1 and absolute rolling");
   const LawConstants pair = pair_constants(law);
-  const PlateConstants plate = plate_constants(PlateLaw{});
+  const PlateConstants plate = plate_constants(scene.plate);
   c_.R = bed.R, c_.m = sphere_mass(bed.R, bed.density), c_.gravity = scene.gravity;
   c_.width = bed.width, c_.depth = bed.depth;
   c_.k1 = pair.k1, c_.k2 = pair.k2, c_.k_adh = pair.k_adh, c_.f0 = pair.f0, c_.mu = pair.mu, c_.mu_r = pair.mu_r;

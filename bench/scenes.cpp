@@ -31,7 +31,7 @@ std::vector<BenchScene> bench_scenes() {
   const auto as_it_is = [](BenchScene&) {};
   const PairLaw full = full_law();
   add("full", full, as_it_is);
-  // Neither spheres nor plates brake spins: as the peers' decks have it [bench/peers/lammps.in].
+  // Neither spheres nor plates brake spins: as LAMMPS's deck has it [bench/peers/lammps.in].
   const auto no_rolling = [](BenchScene& s) { s.plate.rolling_friction = 0.0; };
   add("linear", linear_law(), no_rolling);
   PairLaw cohesionless = full;

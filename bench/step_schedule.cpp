@@ -22,7 +22,8 @@ struct Schedule {
   double longest = 0.0;   // longest chain of tasks that need each other's results [s]
 };
 
-// Whoever is free takes the first ready task in the order of the table, or, by workers, the first of its own.
+// Whoever is free takes the first ready task in the order of the table, or, by workers, the first of its own (real ones look no farther
+// than core/worker_tasks.h says, and take each other's when they have none).
 Schedule schedule(const TaskTable& table, const std::vector<double>& cost, int workers, Takers takers) {
   const std::size_t count = table.tasks().size();
   const bool own = takers == Takers::workers && !table.worker().empty();

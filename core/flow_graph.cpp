@@ -31,9 +31,12 @@ void pause() {
 
 // How long a worker waits for others before it takes one of their tasks. Neighbours that have a core each are about a task behind, of some 50 us or
 // less; in beds that fit in the caches a task is dear to anybody else.
-constexpr auto patience_in_large_beds = std::chrono::microseconds(50), patience_in_caches = std::chrono::microseconds(300);
-// After so many waits in vain a worker waits no more in this run: something else may have the core of whom it waits for.
-constexpr int most_in_vain = 4;
+// After so many waits that brought no task of its own it waits no more in this run: something else may have the core of whom it waits for.
+struct Patience {
+  std::chrono::microseconds wait;
+  int most_in_vain;
+};
+constexpr Patience in_large_beds = {std::chrono::microseconds(50), 64}, in_caches = {std::chrono::microseconds(300), 4};
 
 // Threads that may run at once, as far as is known: the arena's, of a process that has been given some cores.
 int most_threads() {
@@ -68,7 +71,7 @@ struct FlowGraph::Graph {
   std::vector<Task> table;
   std::vector<Worker> workers;
   bool waits = false;
-  std::chrono::microseconds patience{};
+  Patience patience{};
 
   void run(const Task& task) {
     if (task.offset < steps) body(task);
@@ -120,7 +123,7 @@ void FlowGraph::build_for_workers(const TaskTable& table) {
   g.workers = std::vector<Graph::Worker>(g.tasks->workers());
   // Where there are more workers than threads the one that is waited for may need this very thread.
   g.waits = static_cast<int>(g.workers.size()) <= most_threads();
-  g.patience = table.ordered() ? patience_in_large_beds : patience_in_caches;
+  g.patience = table.ordered() ? in_large_beds : in_caches;
   for (std::size_t w = 0; w < g.workers.size(); ++w) {
     g.nodes.push_back(std::make_unique<Graph::Node>(g.graph, [&g, w](const Graph::Message&) {
       g.work(w);
@@ -135,7 +138,7 @@ std::int32_t FlowGraph::Graph::wait_for_a_task(std::size_t worker) {
   std::int32_t task = tasks->take(worker);
   if (task >= 0 || !waits) return task;
   auto& in_vain = workers[worker].waits_in_vain;
-  const bool patient = in_vain.load(std::memory_order_relaxed) < most_in_vain;
+  const bool patient = in_vain.load(std::memory_order_relaxed) < patience.most_in_vain;
   const auto start = std::chrono::steady_clock::now();
   while (tasks->have_left()) {
     for (int k = 0; k < 32; ++k) {
@@ -143,13 +146,12 @@ std::int32_t FlowGraph::Graph::wait_for_a_task(std::size_t worker) {
       if (task = tasks->take(worker); task >= 0) return task;
     }
     const auto waited = std::chrono::steady_clock::now() - start;
-    if (patient && waited < patience) continue;
-    if (task = tasks->take_from_others(worker); task >= 0) return task;
-    if (patient && waited < 2 * patience) continue;
-    in_vain.fetch_add(1, std::memory_order_relaxed);
-    break;
+    if (patient && waited < patience.wait) continue;
+    if (task = tasks->take_from_others(worker); task >= 0) break;
+    if (!patient || waited > 2 * patience.wait) break;
   }
-  return -1;
+  if (patient) in_vain.fetch_add(1, std::memory_order_relaxed);
+  return task;
 }
 
 void FlowGraph::Graph::work(std::size_t worker) {

@@ -3,7 +3,7 @@
 // The table is written down once in the order of the steps. Two tasks that touch the same resource,
 // at least one of them writing, keep that order: edges are derived, nobody writes them. It may be put into another order that keeps all edges; then one
 // thread takes the tasks as they come, more take the first that is ready, or each the first of its own. The same table runs serially,
-// as an oneTBB flow graph [core/flow_graph.h], or on plain threads that wait on their predecessors' flags (for ThreadSanitizer, which cannot
+// as an oneTBB flow graph [core/flow_graph.h], or on plain threads that see for themselves what is done (for ThreadSanitizer, which cannot
 // see through an uninstrumented libtbb).
 #pragma once
 

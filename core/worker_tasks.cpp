@@ -79,24 +79,25 @@ bool WorkerTasks::try_to_take(Queue& queue, std::size_t k) {
   return !queue.taken[k].load(std::memory_order_relaxed) && is_ready(queue.tasks[k]) && !queue.taken[k].exchange(true, std::memory_order_relaxed);
 }
 
-// From the first that is not taken on.
-WorkerTasks::Range WorkerTasks::window_of(const Queue& queue) {
-  std::size_t first = queue.first.load(std::memory_order_relaxed);
+// From the first that is not taken on. Whoever looks notes it, so that nobody goes through the same ones again.
+WorkerTasks::Range WorkerTasks::window_of(Queue& queue) {
+  const std::size_t known = queue.first.load(std::memory_order_relaxed);
+  std::size_t first = known;
   while (first < queue.tasks.size() && queue.taken[first].load(std::memory_order_relaxed)) ++first;
+  if (first != known) queue.first.store(first, std::memory_order_relaxed);
   return {first, std::min(queue.tasks.size(), first + window)};
 }
 
 std::int32_t WorkerTasks::take(std::size_t worker) {
   Queue& queue = queues_[worker];
   const Range range = window_of(queue);
-  if (range.first != queue.first.load(std::memory_order_relaxed)) queue.first.store(range.first, std::memory_order_relaxed);
   for (std::size_t k = range.first; k < range.end; ++k)
     if (try_to_take(queue, k)) return queue.tasks[k];
   return -1;
 }
 
 bool WorkerTasks::can_take(std::size_t worker) {
-  const Queue& queue = queues_[worker];
+  Queue& queue = queues_[worker];
   const Range range = window_of(queue);
   for (std::size_t k = range.first; k < range.end; ++k)
     if (!queue.taken[k].load(std::memory_order_relaxed) && is_ready(queue.tasks[k])) return true;
@@ -118,12 +119,12 @@ void WorkerTasks::done(std::int32_t task) {
   progress(place_[t]).store(nth_[t] + 1, std::memory_order_release);
 }
 
-bool WorkerTasks::has_left(std::size_t worker) const {
+bool WorkerTasks::has_left(std::size_t worker) {
   const Range range = window_of(queues_[worker]);
   return range.first < range.end;
 }
 
-bool WorkerTasks::have_left() const {
+bool WorkerTasks::have_left() {
   for (std::size_t w = 0; w < workers(); ++w)
     if (has_left(w)) return true;
   return false;

@@ -5,7 +5,7 @@
 //
 //     worker 0   a0  b0  a1  b1  a2            a1 needs c0, which worker 1 has not done yet: worker 0 takes b1 first, if that can go on.
 //                ok  ok  ..  next
-//     worker 1   c0  d0  c1  d1                who has nothing left that can go on may take d1 from it: the last that can, farthest from what
+//     worker 1   c0  d0  c1  d1                who has nothing left that can go on may take d0 from it: the last that can, farthest from what
 //                now                           worker 1 does next
 //
 // Of a batch's tasks each waits for the one before, so how many of them are done says which.
@@ -34,8 +34,8 @@ class WorkerTasks {
   void done(std::int32_t task);
   bool can_take(std::size_t worker);  // whether there is one now
   // Whether one of the worker's, or of anybody's, is not taken yet.
-  bool has_left(std::size_t worker) const;
-  bool have_left() const;
+  bool has_left(std::size_t worker);
+  bool have_left();
   // Workers that have a task which waits for this one.
   const std::vector<std::int32_t>& who_waits_for(std::int32_t task) const { return who_waits_[static_cast<std::size_t>(task)]; }
 
@@ -60,7 +60,7 @@ class WorkerTasks {
   struct Range {
     std::size_t first, end;
   };
-  static Range window_of(const Queue& queue);
+  static Range window_of(Queue& queue);
   bool is_ready(std::int32_t task);
   bool try_to_take(Queue& queue, std::size_t k);
 

@@ -4,8 +4,12 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <array>
+#include <chrono>
+#include <map>
 #include <mutex>
 #include <random>
+#include <stdexcept>
 #include <thread>
 
 #include "core/flow_graph.h"
@@ -148,7 +152,8 @@ TEST(WorkerTasks, AreTakenInOrder) {
     return std::pair{first, first + std::min(own[w].end() - first, static_cast<std::ptrdiff_t>(WorkerTasks::window))};
   };
   std::size_t past = 0, others = 0;
-  while (tasks.have_left()) {
+  for (int idle = 0; tasks.have_left();) {
+    ASSERT_LT(idle++, 10000);
     const std::size_t w = random() % 8 == 0 ? 1 : 0;  // one of them is slow
     auto [first, last] = window_of(w);
     const auto wanted = std::find_if(first, last, can);
@@ -163,6 +168,7 @@ TEST(WorkerTasks, AreTakenInOrder) {
       others += task >= 0;
     }
     if (task < 0) continue;
+    idle = 0;
     taken[static_cast<std::size_t>(task)] = true;
     tasks.done(task);
     for (const std::int32_t next : table.successors()[static_cast<std::size_t>(task)]) --waits[static_cast<std::size_t>(next)];
@@ -279,6 +285,50 @@ TEST(WorkerTasks, WorkIsDealtOutEvenly) {
     EXPECT_FALSE(table.ordered());
     const TaskTable plain(sim.batches(), 4, false);
     for (std::size_t t = 0; t < table.tasks().size(); ++t) EXPECT_EQ(table.tasks()[t].batch, plain.tasks()[t].batch);
+  }
+}
+
+// Two workers of which one is slow: the other one's thread does some of its tasks, and each is done once.
+TEST(WorkerTasks, AGraphLetsWorkersHelpEachOther) {
+  Simulation sim = bed(false);
+  sim.ensure_forces();
+  const TaskTable table = dealt_out(sim, false, 2);
+  std::mutex mutex;
+  std::vector<int> times(table.tasks().size(), 0);
+  std::map<std::thread::id, std::array<int, 2>> done;  // by each thread, of each worker's tasks
+  tbb::task_arena two(2);
+  two.execute([&] {
+    FlowGraph graph(table, [&](const Task& task) {
+      const auto t = static_cast<std::size_t>(task.number);
+      if (table.worker()[t] == 0) std::this_thread::sleep_for(std::chrono::microseconds(200));
+      const std::lock_guard<std::mutex> lock(mutex);
+      ++times[t];
+      ++done[std::this_thread::get_id()][static_cast<std::size_t>(table.worker()[t])];
+    }, Takers::workers);
+    graph.run(4);
+  });
+  for (const int of_task : times) EXPECT_EQ(of_task, 1);
+  int of_slow_one_by_both = 0, of_both = 0;
+  for (const auto& [thread, of] : done) of_slow_one_by_both += of[0] > 0, of_both += of[0] + of[1] > 200;
+  if (of_both < 2) GTEST_SKIP() << "one thread did nearly all";
+  EXPECT_EQ(of_slow_one_by_both, 2);
+}
+
+// Whoever waits for what will never be done ends too, and soon.
+TEST(WorkerTasks, AGraphEndsWhenATaskThrows) {
+  Simulation sim = bed(false);
+  sim.ensure_forces();
+  for (const int workers : {1, 2, 5}) {
+    const TaskTable table = dealt_out(sim, false, workers);
+    tbb::task_arena two(2);
+    two.execute([&] {
+      for (std::int32_t bad = 0; bad < static_cast<std::int32_t>(table.tasks().size()); bad += 97) {
+        FlowGraph graph(table, [&](const Task& task) {
+          if (task.number == bad) throw std::runtime_error("a task");
+        }, Takers::workers);
+        EXPECT_THROW(graph.run(4), std::runtime_error);
+      }
+    });
   }
 }
 
