@@ -38,7 +38,7 @@ BatchCopy::BatchCopy(const Batch& b)
       tz(copy_of(b.tz)),
       k_t_last(copy_of(b.k_t_last)),
       sum(copy_of(b.sum)),
-      speed2(static_cast<std::size_t>(b.count), 0.0),
+      speed2(static_cast<std::size_t>(b.count), 0.0f),
       first(b.first),
       count(b.count),
       used(b.used),

@@ -36,7 +36,7 @@ struct BatchCopy {
   AlignedArray<PairTargets> targets;
   AlignedArray<OwnersOfEight> owners;
   AlignedArray<double> sp, tx, ty, tz, k_t_last, sum;
-  std::vector<double> speed2;
+  std::vector<float> speed2;
   std::int32_t first = 0, count = 0, used = 0, padded = 0;
   std::vector<std::int32_t> halo;
   std::vector<Incoming> incoming;

@@ -378,8 +378,9 @@ StretchesOfLines Simulation::lines_of(const std::vector<Asked>& asks) const {
       add(b.i.data(), listed), add(b.row_j.data(), listed), add(b.to.data(), listed), add(b.owners_of_eight.data(), listed / 8);
       continue;
     }
-    for (const auto* column : {&p.x, &p.y, &p.z, &p.vx, &p.vy, &p.vz, &p.ux, &p.uy, &p.uz, &p.radius, &p.inverse_radius, &p.mass, &p.inverse_mass, &speed2_})
+    for (const auto* column : {&p.x, &p.y, &p.z, &p.vx, &p.vy, &p.vz, &p.ux, &p.uy, &p.uz, &p.radius, &p.inverse_radius, &p.mass, &p.inverse_mass})
       if (!column->empty()) add(column->data() + first, count);
+    add(speed2_.data() + first, count);
     add(p.rows.data() + row_size * first, row_size * count);
     add(b.sum.data(), record_size * count);
     for (const Incoming& in : b.incoming) {
@@ -526,9 +527,9 @@ void Simulation::advance(std::int64_t steps) {
     step_ += n;
     steps -= n;
     last_drift_ = dt_;
-    for (int axis = 0; axis < 3; ++axis) drift_at_prune_[axis] += mean_[axis] * (n * dt_);
+    for (int axis = 0; axis < 3; ++axis) drift_since_look_[axis] = mean_[axis] * (n * dt_);
     plane_moved_ += plane_path(n);
-    moved_since_prune_ = true;
+    moved_since_look_ = true;
   }
 }
 

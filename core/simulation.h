@@ -180,7 +180,7 @@ class Simulation {
   void merge_all();
   void keep_sums(AlignedArray<double>& sums);
   void put_sums(const AlignedArray<double>& sums);
-  LookTotals look_at(const AlignedArray<double>& margins);
+  LookTotals look_at_spheres();
   AlignedArray<double> own_speeds();
   double sum_of(const AlignedArray<double>& column);
   double own_speed(std::size_t k) const;
@@ -249,19 +249,18 @@ class Simulation {
   double inserted_ = 0.0, removed_ = 0.0;
 
   // Lists.
-  Margins inner_, outer_;                       // from the last prune on: of the outer ones, what was left then
-  AlignedArray<double> room_;                   // what each sphere may still move [m]
-  AlignedArray<double> speed2_;                 // of each sphere: sum over a run of steps of |v - mean_|^2 [m2/s2]
+  Margins inner_, outer_;                       // what is left of them [core/margins.h]
+  double inner_sum_ = 0.0;                      // of the inner ones at the last prune [m]
+  AlignedArray<float> speed2_;                  // of each sphere: sum over a run of steps of |v - mean_|^2 [m2/s2]
   double plate_gap_ = 0.0;                      // bound of the planes' motion that lists allow [m]
   double redo_margin_ = 0.0;                    // least margin after steps had to be done again [m]
   double kick_factor_ = 1.0;                    // on the mean speed, for spheres that will be hit
   int horizon_ = 64;                            // steps that lists should hold
-  AlignedArray<double> at_prune_;               // positions then, 3 per particle
   double mean_[3] = {0, 0, 0};                  // common velocity taken out of displacements [m/s]
-  double drift_at_prune_[3] = {0, 0, 0};        // displacement by mean_ since then [m]
+  double drift_since_look_[3] = {0, 0, 0};      // displacement by mean_ since lists were last looked at [m]
   double plane_moved_ = 0.0;     // bound of the planes' motion since the prune [m]
   bool lists_stale_ = false;     // prune before the next step
-  bool moved_since_prune_ = true;
+  bool moved_since_look_ = false;
   int unroll_ = 1;               // steps of the graph
   bool asks_ahead_ = false, asks_history_ = false;  // kernels/ask_ahead.h
 

@@ -15,6 +15,7 @@ namespace {
 constexpr double smallest_inner = 0.003, smallest_outer = 0.08;
 constexpr double widest = 0.5;
 constexpr double caution = 1.2;           // speeds may grow until the lists are looked at again
+constexpr double rounded_speeds = 1.0001;  // sums of squared speeds are of single precision
 constexpr int shortest_horizon = 16, longest_horizon = 512;  // steps from prune to prune
 constexpr int outer_life = 16;             // horizons from rebuild to rebuild of a bed in steady motion
 constexpr int worthwhile = 8;             // steps that lists must still hold, lest they are made anew
@@ -56,17 +57,8 @@ void Simulation::put_sums(const AlignedArray<double>& sums) {
 
 // Inner lists hold from here on.
 void Simulation::start_from_here() {
-  const auto n = static_cast<std::size_t>(particles_.count);
-  at_prune_.resize(3 * n + padding);  // whole vectors may be read
-  parallel(stretches_of(n), [&](int part) {
-    const IndexRange range = stretch(n, part);
-    std::size_t axis = 0;
-    for (const auto* column : {&particles_.x, &particles_.y, &particles_.z})
-      std::copy_n(column->data() + range.first, range.last - range.first, at_prune_.data() + axis++ * n + range.first);
-  });
-  std::fill(drift_at_prune_, drift_at_prune_ + 3, 0.0);
   plane_moved_ = 0.0;
-  moved_since_prune_ = false;
+  moved_since_look_ = false;
 }
 
 // Speed relative to the common velocity [m/s].
@@ -117,7 +109,7 @@ void Simulation::choose_horizon() {
   double listed = 0.0, outer = 0.0;
   for (const Batch& b : batches_) listed += b.used, outer += static_cast<double>(b.outer_j.size());
   const auto n = static_cast<std::size_t>(particles_.count);
-  const double margin = inner_.of.empty() ? 0.0 : sum_of(inner_.of);
+  const double margin = inner_sum_;
   if (n == 0 || !(margin > 0.0)) return;
   const double least = smallest_inner * largest_radius_ * static_cast<double>(n);
   const double widened = (listed - static_cast<double>(contacts_)) * std::max(0.0, margin - least) / margin;
@@ -172,13 +164,15 @@ void Simulation::check_speeds(const AlignedArray<double>& speeds) {
 }
 
 // Margins that hold for about a horizon at these speeds; outer ones as well where lists are `fresh`. Else false where what is left of the
-// outer ones is too little: from prune to prune each sphere uses up the distance between its places at both.
+// outer ones is too little.
 bool Simulation::choose_margins(bool fresh, const AlignedArray<double>& speeds) {
   const auto n = static_cast<std::size_t>(particles_.count);
   const double R = largest_radius_, most = widest_margin();
-  inner_.of.resize(static_cast<std::size_t>(particles_.padded));
-  if (fresh) outer_.of.resize(static_cast<std::size_t>(particles_.padded));
-  if (!fresh) look_at(outer_.of);
+  const auto padded = static_cast<std::size_t>(particles_.padded);
+  inner_.of.resize(padded);
+  if (fresh) outer_.of.resize(padded);
+  speed2_.resize(padded);
+  if (!fresh && moved_since_look_) look_at_spheres();
   // Who is slow may be hit: a sphere's margin is never below what the mean speed, times a factor that grows whenever
   // steps had to be done again, takes.
   const double least_path = n > 0 ? caution * kick_factor_ * sum_of(speeds) / static_cast<double>(n) * dt_ : 0.0;
@@ -198,14 +192,14 @@ bool Simulation::choose_margins(bool fresh, const AlignedArray<double>& speeds) 
       double inner = std::min(std::max({wish, redo_margin_, needed}), most);
       if (fresh) {
         const double further = engine_.skin > 0.0 ? 0.5 * engine_.skin : inner + std::max(smallest_outer * R, outer_life * horizon_ * path);
-        outer_.of[k] = std::clamp(further, inner, most);
-        now.outer_sum += outer_.of[k], now.outer_largest = std::max(now.outer_largest, outer_.of[k]);
+        const double outer = outer_.of[k] = rounded_down(std::clamp(further, inner, most));
+        now.outer_sum += outer, now.outer_largest = std::max(now.outer_largest, outer);
       } else {
-        const double left = room_[k];  // enough if it lasts for some steps
-        now.enough = now.enough && left > 0.0 && left >= std::max({std::min(inner, worthwhile * path), std::min(redo_margin_, most), needed});
+        const double left = outer_.of[k];  // enough if it lasts for some steps
+        now.enough = now.enough && left > 0.0 && left >= std::max({std::min(inner, worthwhile * path), std::min(redo_margin_, most * (1.0 - 1e-6)), needed});
         inner = std::min(inner, left);
       }
-      inner_.of[k] = inner;
+      inner = inner_.of[k] = rounded_down(inner);
       now.inner_sum += inner, now.inner_largest = std::max(now.inner_largest, inner);
     }
     found[static_cast<std::size_t>(part)] = now;
@@ -216,41 +210,38 @@ bool Simulation::choose_margins(bool fresh, const AlignedArray<double>& speeds) 
     all.outer_sum += of.outer_sum, all.outer_largest = std::max(all.outer_largest, of.outer_largest);
     all.enough = all.enough && of.enough;
   }
-  inner_.largest = all.inner_largest;
+  inner_.largest = all.inner_largest, inner_sum_ = all.inner_sum;
   if (fresh) outer_.largest = all.outer_largest;
   if (n > 0) counters_.gap = 2.0 * all.inner_sum / static_cast<double>(n);
   if (n > 0 && fresh) counters_.skin = 2.0 * all.outer_sum / static_cast<double>(n);
   plate_gap_ = std::max(0.05 * R, 1.5 * plane_path(horizon_));
-  if (!fresh && all.enough) outer_.of.swap(room_);
   return all.enough;
 }
 
-// Sets the room that each sphere has left of the margin that it had at the last prune.
-LookTotals Simulation::look_at(const AlignedArray<double>& margins) {
-  room_.resize(static_cast<std::size_t>(particles_.padded));
-  speed2_.resize(static_cast<std::size_t>(particles_.padded));
+// Takes off the room of each sphere what it has moved in the last run of steps: where that began is still kept, for going back.
+LookTotals Simulation::look_at_spheres() {
   const LookConstants constants{domain_.width, domain_.inverse_width, domain_.depth, domain_.inverse_depth,
-                                {drift_at_prune_[0], drift_at_prune_[1], drift_at_prune_[2]}, {mean_[0], mean_[1], mean_[2]}, std::numeric_limits<double>::infinity()};
+                                {drift_since_look_[0], drift_since_look_[1], drift_since_look_[2]}, {mean_[0], mean_[1], mean_[2]}, std::numeric_limits<double>::infinity()};
   std::vector<LookTotals> found(batches_.size());
   parallel(static_cast<int>(batches_.size()), [&](int index) {
     const Batch& b = batches_[static_cast<std::size_t>(index)];
     const Particles& p = particles_;
-    const auto first = static_cast<std::size_t>(b.first), n = static_cast<std::size_t>(p.count);
-    const auto column = [&](std::size_t axis) { return moved_since_prune_ ? at_prune_.data() + axis * n + first : nullptr; };
+    const auto first = static_cast<std::size_t>(b.first);
+    const auto then = [&](const AlignedArray<double>& column) { return moved_since_look_ ? column.data() + first : nullptr; };
     const LookBatch batch{p.x.data() + first, p.y.data() + first, p.z.data() + first, p.vx.data() + first, p.vy.data() + first, p.vz.data() + first,
-                          column(0), column(1), column(2), margins.data() + first, room_.data() + first, speed2_.data() + first, b.count,
+                          then(saved_->x), then(saved_->y), then(saved_->z), inner_.of.data() + first, outer_.of.data() + first, speed2_.data() + first, b.count,
                           std::clamp(p.count - b.first, 0, b.count)};
     kernels_.look(batch, constants, found[static_cast<std::size_t>(index)]);
   });
+  moved_since_look_ = false;
   LookTotals all;
   for (const LookTotals& of : found) all.fastest = std::max(all.fastest, of.fastest), all.closest = std::max(all.closest, of.closest);
   return all;
 }
 
-// For how many steps, at most `wanted`, the lists will hold if speeds do not grow much; 0 where not for one. Sets the
-// room that each sphere has left, which the steps watch.
+// For how many steps, at most `wanted`, the lists will hold if speeds do not grow much; 0 where not for one.
 int Simulation::look(int wanted) {
-  const LookTotals found = look_at(inner_.of);
+  const LookTotals found = look_at_spheres();
   const double fastest = caution * found.fastest, closest = gravity_ * dt_ * found.closest;
   const auto holds = [&](int steps) {  // a free fall or a push may add speed; a kick by gravity is the least to expect
     return (fastest + closest * steps) * (dt_ * steps) <= 1.0 && plane_moved_ + plane_path(steps) <= plate_gap_;
@@ -264,7 +255,7 @@ int Simulation::look(int wanted) {
 // listed with. The way of a sphere is at most dt sqrt(steps sum of v^2).
 Simulation::Ways Simulation::look_back(int steps) {
   const auto n = static_cast<std::size_t>(particles_.count);
-  const double factor = steps * dt_ * dt_;
+  const double factor = steps * dt_ * dt_ * rounded_speeds;
   struct Found {
     std::size_t within = 0;
     double sum = 0.0;  // a number only if all are
@@ -277,8 +268,9 @@ Simulation::Ways Simulation::look_back(int steps) {
     const IndexRange range = stretch(n, part);
     Found now;
     for (std::size_t k = range.first; k < range.last; ++k) {
-      now.within += factor * speed2_[k] <= room_[k] * room_[k] ? 1u : 0u;
-      now.sum += speed2_[k];
+      const double speed2 = speed2_[k], room = inner_.of[k];
+      now.within += factor * speed2 <= room * room ? 1u : 0u;
+      now.sum += speed2;
     }
     std::size_t k = range.first;
     for (; k + 8 <= range.last; k += 8)
@@ -295,7 +287,10 @@ Simulation::Ways Simulation::look_back(int steps) {
   }
   if (within == n) return Ways::within_margins;
   std::vector<char> beyond(n);
-  for (std::size_t k = 0; k < n; ++k) beyond[k] = !(factor * speed2_[k] <= room_[k] * room_[k]);
+  for (std::size_t k = 0; k < n; ++k) {
+    const double speed2 = speed2_[k], room = inner_.of[k];
+    beyond[k] = !(factor * speed2 <= room * room);
+  }
   if (!unlisted_apart(steps, beyond)) return Ways::too_long;
   counters_.spared_steps += steps;
   return Ways::within_margins;
@@ -305,11 +300,11 @@ Simulation::Ways Simulation::look_back(int steps) {
 // went `beyond` their margins: most often it is one that was pushed, between others that hardly moved.
 bool Simulation::unlisted_apart(int steps, const std::vector<char>& beyond) const {
   const auto n = static_cast<std::size_t>(particles_.count);
-  const double factor = (1.0 + 1e-9) * dt_ * std::sqrt(static_cast<double>(steps)), rounding = 1e-9 * largest_radius_;
-  // Since the prune: before these steps, and in them.
-  const auto way = [&](std::size_t k) { return std::max(0.0, inner_.of[k] - room_[k]) + factor * std::sqrt(speed2_[k]) + rounding; };
-  const auto at_prune = [&](std::size_t k, std::size_t axis) { return at_prune_[axis * n + k]; };
-  const double planes_moved = plane_moved_ + plane_path(steps);
+  const double factor = dt_ * std::sqrt(steps * rounded_speeds), rounding = 1e-9 * largest_radius_;
+  const auto way = [&](std::size_t k) { return factor * std::sqrt(static_cast<double>(speed2_[k])) + rounding; };
+  const AlignedArray<double>* const columns[3] = {&saved_->x, &saved_->y, &saved_->z};
+  const auto before = [&](std::size_t k, std::size_t axis) { return (*columns[axis])[k]; };
+  const double planes_moved = plane_path(steps);
   for (std::size_t k = 0; k < n; ++k) {
     if (!beyond[k]) continue;
     if (!(way(k) <= outer_.of[k])) return false;
@@ -317,8 +312,8 @@ bool Simulation::unlisted_apart(int steps, const std::vector<char>& beyond) cons
       const PlaneMotion& plane = planes_[static_cast<std::size_t>(plate)];
       if (!plane.present) continue;
       const Plane shape = plane_shape(plate);
-      const double apart = shape.sign * (at_prune(k, static_cast<std::size_t>(shape.axis)) - plane.position_at(step_)) - particles_.radius_of(static_cast<std::int32_t>(k));
-      if (apart >= way(k) + 2.0 * planes_moved) continue;
+      const double apart = shape.sign * (before(k, static_cast<std::size_t>(shape.axis)) - plane.position_at(step_)) - particles_.radius_of(static_cast<std::int32_t>(k));
+      if (apart >= way(k) + planes_moved) continue;
       const auto batch = std::find_if(batches_.begin(), batches_.end(), [&](const Batch& b) { return k < static_cast<std::size_t>(b.first + b.count); });
       const PlateList& list = batch->plates[plate];
       if (std::find(list.particle.begin(), list.particle.begin() + list.used, static_cast<std::int32_t>(k)) == list.particle.begin() + list.used) return false;
@@ -329,8 +324,8 @@ bool Simulation::unlisted_apart(int steps, const std::vector<char>& beyond) cons
       if (b.listed[m / 64] >> (m % 64) & 1) continue;
       const auto i = static_cast<std::size_t>(b.outer_i[m]), j = static_cast<std::size_t>(b.outer_j[m]);
       if (!beyond[i] && !beyond[j]) continue;
-      const double dx = domain_.nearest_x(at_prune(i, 0) - at_prune(j, 0)), dy = domain_.nearest_y(at_prune(i, 1) - at_prune(j, 1));
-      const double apart = std::hypot(dx, dy, at_prune(i, 2) - at_prune(j, 2)) - particles_.radius_of(b.outer_i[m]) - particles_.radius_of(b.outer_j[m]);
+      const double dx = domain_.nearest_x(before(i, 0) - before(j, 0)), dy = domain_.nearest_y(before(i, 1) - before(j, 1));
+      const double apart = std::hypot(dx, dy, before(i, 2) - before(j, 2)) - particles_.radius_of(b.outer_i[m]) - particles_.radius_of(b.outer_j[m]);
       if (!(way(i) + way(j) <= apart)) return false;
     }
   }

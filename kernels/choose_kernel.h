@@ -14,7 +14,7 @@ PLATEN_INLINE unsigned closer(const ChooseBatch& b, const std::int32_t* i, const
   I::template fetch_rows<row_size>(b.rows, i, own);
   I::template fetch_rows<row_size>(b.rows, j, other);
   const Real dx = nearest_image<I>(own[0] - other[0], b.width, b.inverse_width), dy = nearest_image<I>(own[1] - other[1], b.depth, b.inverse_depth);
-  const Real dz = own[2] - other[2], reach = (own[3] + I::gather(b.margin, i)) + (other[3] + I::gather(b.margin, j));
+  const Real dz = own[2] - other[2], reach = (own[3] + I::gather_floats(b.margin, i)) + (other[3] + I::gather_floats(b.margin, j));
   return I::bits((dx * dx + dy * dy) + dz * dz < reach * reach);
 }
 

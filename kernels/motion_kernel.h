@@ -16,7 +16,8 @@ PLATEN_INLINE void ask_for_spheres(const MotionBatch& b, std::int64_t k) {
   constexpr std::int64_t line = 8;
   for (std::int64_t lane = 0; lane < I::width; ++lane) __builtin_prefetch(b.sum + record_size * (k + lane), 1);
   for (std::int64_t m = 0; m < row_size * I::width; m += line) __builtin_prefetch(b.rows + row_size * k + m, 1);
-  for (const double* column : {b.x, b.y, b.z, b.vx, b.vy, b.vz, b.ux, b.uy, b.uz, b.speed2}) __builtin_prefetch(column + k, 1);
+  for (const double* column : {b.x, b.y, b.z, b.vx, b.vy, b.vz, b.ux, b.uy, b.uz}) __builtin_prefetch(column + k, 1);
+  __builtin_prefetch(b.speed2 + k, 1);
   if constexpr (!equal_spheres)
     for (const double* column : {b.inverse_mass, b.mass, b.radius, b.inverse_radius}) __builtin_prefetch(column + k);
 }
@@ -101,7 +102,7 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
 
     const Vec3<I> excess = {v.x - I::set(c.mean_x), v.y - I::set(c.mean_y), v.z - I::set(c.mean_z)};
     const Real speed2 = dot(excess, excess);
-    I::store(b.speed2 + k, I::load(b.speed2 + k) + speed2);
+    I::store_floats(b.speed2 + k, I::load_floats(b.speed2 + k) + speed2);
     fastest = I::max(fastest, speed2);
   }
   totals.fastest2 = I::largest(fastest);

@@ -38,6 +38,8 @@ struct Scalar {
   static PLATEN_INLINE Real set(double a) { return a; }
   static PLATEN_INLINE Real load(const double* p) { return *p; }
   static PLATEN_INLINE void store(double* p, Real a) { *p = a; }
+  static PLATEN_INLINE Real load_floats(const float* p) { return *p; }
+  static PLATEN_INLINE void store_floats(float* p, Real a) { *p = static_cast<float>(a); }
   static PLATEN_INLINE Real fma(Real a, Real b, Real c) { return __builtin_fma(a, b, c); }    // a b + c
   static PLATEN_INLINE Real fms(Real a, Real b, Real c) { return __builtin_fma(a, b, -c); }   // a b - c
   static PLATEN_INLINE Real fnma(Real a, Real b, Real c) { return __builtin_fma(-a, b, c); }  // c - a b
@@ -67,7 +69,7 @@ struct Scalar {
   static PLATEN_INLINE double sum(Real a) { return a; }  // exact for order-free terms, whose order does not matter
   static PLATEN_INLINE double largest(Real a) { return a; }
 
-  static PLATEN_INLINE Real gather(const double* p, const std::int32_t* place) { return p[place[0]]; }  // p[place[lane]]
+  static PLATEN_INLINE Real gather_floats(const float* p, const std::int32_t* place) { return p[place[0]]; }  // p[place[lane]]
   // fields[k][lane] <- rows[unit place[lane] + k], k = 0..n-1: n (a multiple of 4) numbers of `width` rows.
   template <int unit, int n>
   static PLATEN_INLINE void fetch_rows(const double* rows, const std::int32_t* place, Real (&fields)[n]) {
@@ -124,6 +126,8 @@ struct Avx2 {
   static PLATEN_INLINE Real set(double a) { return _mm256_set1_pd(a); }
   static PLATEN_INLINE Real load(const double* p) { return _mm256_loadu_pd(p); }
   static PLATEN_INLINE void store(double* p, Real a) { _mm256_storeu_pd(p, a); }
+  static PLATEN_INLINE Real load_floats(const float* p) { return _mm256_cvtps_pd(_mm_loadu_ps(p)); }
+  static PLATEN_INLINE void store_floats(float* p, Real a) { _mm_storeu_ps(p, _mm256_cvtpd_ps(a)); }
   static PLATEN_INLINE Real fma(Real a, Real b, Real c) { return _mm256_fmadd_pd(a, b, c); }
   static PLATEN_INLINE Real fms(Real a, Real b, Real c) { return _mm256_fmsub_pd(a, b, c); }
   static PLATEN_INLINE Real fnma(Real a, Real b, Real c) { return _mm256_fnmadd_pd(a, b, c); }
@@ -164,8 +168,8 @@ struct Avx2 {
     const double x = v[0] > v[1] ? v[0] : v[1], y = v[2] > v[3] ? v[2] : v[3];
     return x > y ? x : y;
   }
-  static PLATEN_INLINE Real gather(const double* p, const std::int32_t* place) {
-    return _mm256_set_pd(p[place[3]], p[place[2]], p[place[1]], p[place[0]]);
+  static PLATEN_INLINE Real gather_floats(const float* p, const std::int32_t* place) {
+    return _mm256_cvtps_pd(_mm_set_ps(p[place[3]], p[place[2]], p[place[1]], p[place[0]]));
   }
   static PLATEN_INLINE void transpose(__m256d& a, __m256d& b, __m256d& c, __m256d& d) {
     const __m256d ab_lo = _mm256_unpacklo_pd(a, b), ab_hi = _mm256_unpackhi_pd(a, b);
@@ -256,6 +260,8 @@ struct Avx512 {
   static PLATEN_INLINE Real set(double a) { return _mm512_set1_pd(a); }
   static PLATEN_INLINE Real load(const double* p) { return _mm512_loadu_pd(p); }
   static PLATEN_INLINE void store(double* p, Real a) { _mm512_storeu_pd(p, a); }
+  static PLATEN_INLINE Real load_floats(const float* p) { return _mm512_cvtps_pd(_mm256_loadu_ps(p)); }
+  static PLATEN_INLINE void store_floats(float* p, Real a) { _mm256_storeu_ps(p, _mm512_cvtpd_ps(a)); }
   static PLATEN_INLINE Real fma(Real a, Real b, Real c) { return _mm512_fmadd_pd(a, b, c); }
   static PLATEN_INLINE Real fms(Real a, Real b, Real c) { return _mm512_fmsub_pd(a, b, c); }
   static PLATEN_INLINE Real fnma(Real a, Real b, Real c) { return _mm512_fnmadd_pd(a, b, c); }
@@ -292,8 +298,8 @@ struct Avx512 {
   static PLATEN_INLINE double sum(Real a) { return _mm512_reduce_add_pd(a); }
   static PLATEN_INLINE double largest(Real a) { return _mm512_reduce_max_pd(a); }
 
-  static PLATEN_INLINE Real gather(const double* p, const std::int32_t* place) {
-    return _mm512_set_pd(p[place[7]], p[place[6]], p[place[5]], p[place[4]], p[place[3]], p[place[2]], p[place[1]], p[place[0]]);
+  static PLATEN_INLINE Real gather_floats(const float* p, const std::int32_t* place) {
+    return _mm512_cvtps_pd(_mm256_set_ps(p[place[7]], p[place[6]], p[place[5]], p[place[4]], p[place[3]], p[place[2]], p[place[1]], p[place[0]]));
   }
 
   template <int unit, int n>

@@ -148,20 +148,20 @@ struct SearchedSphere {
 
 // Pairs of an outer list, of which the inner one takes those closer than their radii and margins.
 struct ChooseBatch {
-  const double *rows, *margin;
+  const double* rows;
+  const float* margin;
   const std::int32_t *i, *j;
   std::int64_t count;
   double width, inverse_width, depth, inverse_depth;  // periodic lengths [m]; 0 where not periodic
   std::uint64_t* chosen;                              // out: a bit for each pair, the first of 64 lowest
 };
 
-// Spheres of a batch when lists are looked at: now, and at the last prune.
+// Spheres of a batch when lists are looked at: now, and at the last look.
 struct LookBatch {
   const double *x, *y, *z, *vx, *vy, *vz;
   const double *then_x, *then_y, *then_z;  // null where nothing has moved since
-  const double* margin;                    // what each may move [m]
-  double* room;                            // out: what is left of it [m]
-  double* speed2;                          // set to 0
+  float *inner, *outer;                    // what each may still move before either list is made anew; its way since then is taken off [m]
+  float* speed2;                           // set to 0
   std::int32_t count, particles;           // multiple of padding; of them particles
 };
 struct LookConstants {
@@ -231,7 +231,7 @@ struct MotionBatch {
   std::int32_t* image;     // 2 per particle
   double* sum;             // records: the forces
   bool clears;             // sets them to zero
-  double* speed2;          // of each particle: |v - mean|^2 is added [m2/s2]
+  float* speed2;           // of each particle: |v - mean|^2 is added [m2/s2]
   std::int32_t count;      // multiple of padding
   bool asks;               // for spheres ahead, where a near cache does not hold the bed
 };

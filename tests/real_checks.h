@@ -204,7 +204,12 @@ class RealChecks {
       I::template fetch_rows<12>(row, index, fields);
       for (int k = 0; k < 12; ++k)
         each("fetch_rows", fields[k], [&](int lane) { return 1000.0 + 12 * index[lane] + k; });
-      each("gather", I::gather(row, index), [&](int lane) { return 1000.0 + index[lane]; });
+      float narrow[rows];
+      for (int k = 0; k < rows; ++k) narrow[k] = 1000.0f + static_cast<float>(k);
+      each("gather_floats", I::gather_floats(narrow, index), [&](int lane) { return 1000.0 + index[lane]; });
+      float near[W];
+      I::store_floats(near, I::load(row + start) * I::set(1.0 / 3.0));
+      each("load_floats", I::load_floats(near), [&](int lane) { return static_cast<double>(static_cast<float>((1000.0 + start + lane) * (1.0 / 3.0))); });
       Real part_of_row[4];
       std::int32_t place[W];
       for (int lane = 0; lane < W; ++lane) place[lane] = 12 * index[lane];

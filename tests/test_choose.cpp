@@ -13,10 +13,11 @@ namespace {
 TEST(Choose, TakesWhatOnePairAtATimeTakes) {
   constexpr std::int32_t spheres = 40;
   scenes::Sequence random(3);
-  std::vector<double> rows, margin;
+  std::vector<double> rows;
+  std::vector<float> margin;
   for (std::int32_t k = 0; k < spheres; ++k) {
     for (int field = 0; field < row_size; ++field) rows.push_back(field == 3 ? 0.1 + 0.1 * random.next() : random.next());
-    margin.push_back(0.2 * random.next());
+    margin.push_back(static_cast<float>(0.2 * random.next()));
   }
   std::vector<std::int32_t> i, j;
   for (std::int32_t k = 0; k < 200; ++k) i.push_back(k * spheres / 200), j.push_back(k * 17 % spheres);
