@@ -70,9 +70,10 @@ PairBatch BatchCopy::pairs(const StateCopy& state) {
   b.nothing = static_cast<std::int32_t>(sum.size() * sizeof(double)) - record_bytes;
   b.dense = true;
   b.leap = std::numeric_limits<double>::infinity();  // every listed pair goes through the law
-  b.x = state.x.data(), b.y = state.y.data(), b.z = state.z.data();
-  b.vx = state.vx.data(), b.vy = state.vy.data(), b.vz = state.vz.data();
-  b.ux = state.ux.data(), b.uy = state.uy.data(), b.uz = state.uz.data();
+  const auto column = [&](const AlignedArray<double>& a) { return a.data() + first; };
+  b.x = column(state.x), b.y = column(state.y), b.z = column(state.z);
+  b.vx = column(state.vx), b.vy = column(state.vy), b.vz = column(state.vz);
+  b.ux = column(state.ux), b.uy = column(state.uy), b.uz = column(state.uz);
   return b;
 }
 

@@ -5,7 +5,7 @@
 namespace platen {
 
 double state_bytes(const Batch& b) {
-  const double sphere = sizeof(double) * (9 + row_size + record_size + 1) + 2 * sizeof(std::int32_t);
+  const double sphere = sizeof(double) * (row_size + record_size) + sizeof(float) + 2 * sizeof(std::int32_t);
   return sphere * b.count + record_bytes * static_cast<double>(b.halo.size());
 }
 
@@ -17,6 +17,12 @@ double contact_bytes(const Batch& b) {
 double touched_bytes(const std::vector<Batch>& batches) {
   double bytes = 0.0;
   for (const Batch& b : batches) bytes += state_bytes(b) + contact_bytes(b);
+  return bytes;
+}
+
+double touched_bytes_with_columns(const std::vector<Batch>& batches) {
+  double bytes = touched_bytes(batches);
+  for (const Batch& b : batches) bytes += 9.0 * sizeof(double) * b.count;
   return bytes;
 }
 

@@ -9,12 +9,14 @@
 
 namespace platen {
 
-// Of each sphere: the state (nine columns and the row), its sums, its image and speed [bytes].
+// Of each sphere: its row, which alone holds the state while steps have an order, its sums, its image and speed [bytes].
 double state_bytes(const Batch& batch);
 // Of each contact: its history and lists [bytes].
 double contact_bytes(const Batch& batch);
 // What a step touches of these batches [bytes].
 double touched_bytes(const std::vector<Batch>& batches);
+// The same of a bed that does not move in its rows alone, by which it is decided whether it is large.
+double touched_bytes_with_columns(const std::vector<Batch>& batches);
 
 // What part of a batch a task needs that no cache holds.
 struct Missing {

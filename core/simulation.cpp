@@ -262,8 +262,9 @@ void Simulation::integrate(Batch& b, const MotionConstants& c, bool saves) {
   Particles& p = particles_;
   const auto first = static_cast<std::size_t>(b.first);
   const auto column = [&](AlignedArray<double>& a) { return a.empty() ? nullptr : a.data() + first; };
-  const MotionBatch batch{column(p.x), column(p.y), column(p.z), column(p.vx), column(p.vy), column(p.vz), column(p.ux),
-                          column(p.uy), column(p.uz), column(p.inverse_mass), column(p.mass), column(p.radius),
+  const auto state = [&](AlignedArray<double>& a) { return moves_in_rows_ ? nullptr : a.data() + first; };
+  const MotionBatch batch{state(p.x), state(p.y), state(p.z), state(p.vx), state(p.vy), state(p.vz), state(p.ux),
+                          state(p.uy), state(p.uz), column(p.inverse_mass), column(p.mass), column(p.radius),
                           column(p.inverse_radius), p.rows.data() + row_size * first, p.image.data() + 2 * first,
                           b.sum.data(), true, speed2_.data() + first, b.count, asks_ahead_};
   MotionTotals totals;
@@ -272,6 +273,7 @@ void Simulation::integrate(Batch& b, const MotionConstants& c, bool saves) {
   const auto filled = static_cast<std::size_t>(std::max(b.first, p.count)), end = first + static_cast<std::size_t>(b.count);
   for (auto k = filled; k < end; ++k) {
     for (auto* a : {&p.x, &p.y, &p.z, &p.vx, &p.vy, &p.vz, &p.ux, &p.uy, &p.uz}) (*a)[k] = 0.0;
+    for (const std::size_t part : {0, 4, 8}) std::fill_n(p.rows.data() + row_size * k + part, 3, 0.0);
     p.image[2 * k] = p.image[2 * k + 1] = 0;
   }
   b.fastest = std::sqrt(totals.fastest2);
@@ -315,6 +317,15 @@ double Simulation::leap_of(const Batch& b, double dt) const {
   return (1.0 + 1e-9) * (b.fastest + fastest) * dt + 1e-9 * largest_radius_;
 }
 
+namespace {
+// For columns of a batch's spheres [kernels/staged_owners.h].
+double* stage_of_this_thread(std::int32_t spheres) {
+  static thread_local AlignedArray<double> stage;
+  stage.reserve(static_cast<std::size_t>(9 * stage_column(spheres)));
+  return stage.data();
+}
+}  // namespace
+
 // `cleared`: the sums of the batch's particles are zero already.
 void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, const PlateConstants& plate_law, bool cleared,
                           const StretchesOfLines* asked) {
@@ -324,11 +335,11 @@ void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, 
   const double leap = leap_of(b, law.dt);
   const auto nothing = static_cast<std::int32_t>(b.sum.size() * sizeof(double)) - record_bytes;
   const bool dense = is_dense(b);
+  const auto state = [&](const AlignedArray<double>& a) { return moves_in_rows_ ? nullptr : a.data() + b.first; };
   PairBatch pairs{particles_.rows.data(), b.i.data(), b.row_j.data(), b.to.data(), b.owners_of_eight.data(), b.sp.data(), b.tx.data(),
                   b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum.data(), b.first, b.padded, b.first + b.count, nothing, dense, leap,
-                  particles_.x.data(), particles_.y.data(), particles_.z.data(), particles_.vx.data(),
-                  particles_.vy.data(), particles_.vz.data(), particles_.ux.data(), particles_.uy.data(),
-                  particles_.uz.data(), dense && asks_for_partners() ? b.ahead : 0, particles_.padded, asks_history_, nullptr, 0, 0};
+                  state(particles_.x), state(particles_.y), state(particles_.z), state(particles_.vx), state(particles_.vy), state(particles_.vz), state(particles_.ux),
+                  state(particles_.uy), state(particles_.uz), moves_in_rows_ ? stage_of_this_thread(b.count) : nullptr, dense && asks_for_partners() ? b.ahead : 0, particles_.padded, asks_history_, nullptr, 0, 0};
   if (asked != nullptr) asked->put_into(pairs);
   b.pair_totals.contacts = 0;
   kernels_.contacts(pairs, law, b.pair_totals);
@@ -378,7 +389,8 @@ StretchesOfLines Simulation::lines_of(const std::vector<Asked>& asks) const {
       add(b.i.data(), listed), add(b.row_j.data(), listed), add(b.to.data(), listed), add(b.owners_of_eight.data(), listed / 8);
       continue;
     }
-    for (const auto* column : {&p.x, &p.y, &p.z, &p.vx, &p.vy, &p.vz, &p.ux, &p.uy, &p.uz, &p.radius, &p.inverse_radius, &p.mass, &p.inverse_mass})
+    // Only large beds ask, and those move in rows.
+    for (const auto* column : {&p.radius, &p.inverse_radius, &p.mass, &p.inverse_mass})
       if (!column->empty()) add(column->data() + first, count);
     add(speed2_.data() + first, count);
     add(p.rows.data() + row_size * first, row_size * count);
@@ -455,6 +467,7 @@ void Simulation::prepare_table() {
   const bool in_graph = engine_.executor == Executor::flow_graph, alone = engine_.threads == 1 || engine_.executor == Executor::serial;
   const double cache = order_if_large(*table_, batches_, engine_.cache, in_graph ? engine_.threads : 1, on_workers());
   // A worker asks for what it will itself take next; where anybody may take a task nobody knows who that is.
+  moves_in_rows_ = cache > 0.0;
   if (cache > 0.0 && (alone || !table_->worker().empty())) asks_ = asks_of_tasks(*table_, batches_, asked_beyond * cache);
   // Batches of a few spheres, which only a case file asks for, would make long tables of who waits for whom.
   const auto threads = static_cast<std::size_t>(engine_.threads);
@@ -499,7 +512,10 @@ void Simulation::advance(std::int64_t steps) {
     const Ways ways = look_back(n);
     if (ways == Ways::too_long) {
       double fastest = 0.0;
-      for (std::size_t k = 0; k < static_cast<std::size_t>(particles_.count); ++k) fastest = std::max(fastest, own_speed(k));
+      for (std::size_t k = 0; k < static_cast<std::size_t>(particles_.count); ++k) {
+        const double* v = particles_.rows.data() + row_size * k + 4;
+        fastest = std::max(fastest, std::hypot(v[0] - mean_[0], v[1] - mean_[1], v[2] - mean_[2]));
+      }
       const bool known = std::isfinite(fastest);
       restore();
       counters_.redone_steps += n;
@@ -520,6 +536,7 @@ void Simulation::advance(std::int64_t steps) {
         continue;
       }
       step_ += n;
+      if (moves_in_rows_) settle();  // what is still written tells of where it ended
       fail("forces or velocities out of range");
     }
     collect();
@@ -529,7 +546,8 @@ void Simulation::advance(std::int64_t steps) {
     last_drift_ = dt_;
     for (int axis = 0; axis < 3; ++axis) drift_since_look_[axis] = mean_[axis] * (n * dt_);
     plane_moved_ += plane_path(n);
-    moved_since_look_ = true;
+    if (moves_in_rows_) settle();
+    moved_since_look_ = !moves_in_rows_;
   }
 }
 

@@ -180,7 +180,9 @@ class Simulation {
   void merge_all();
   void keep_sums(AlignedArray<double>& sums);
   void put_sums(const AlignedArray<double>& sums);
+  LookConstants look_constants() const;
   LookTotals look_at_spheres();
+  void settle();
   AlignedArray<double> own_speeds();
   double sum_of(const AlignedArray<double>& column);
   double own_speed(std::size_t k) const;
@@ -261,6 +263,7 @@ class Simulation {
   double plane_moved_ = 0.0;     // bound of the planes' motion since the prune [m]
   bool lists_stale_ = false;     // prune before the next step
   bool moved_since_look_ = false;
+  bool moves_in_rows_ = false;   // in runs of steps of this table; particles_'s columns keep where they began until that is settled
   int unroll_ = 1;               // steps of the graph
   bool asks_ahead_ = false, asks_history_ = false;  // kernels/ask_ahead.h
 

@@ -218,10 +218,27 @@ bool Simulation::choose_margins(bool fresh, const AlignedArray<double>& speeds) 
   return all.enough;
 }
 
+LookConstants Simulation::look_constants() const {
+  return {domain_.width, domain_.inverse_width, domain_.depth, domain_.inverse_depth, {drift_since_look_[0], drift_since_look_[1], drift_since_look_[2]},
+          {mean_[0], mean_[1], mean_[2]}, std::numeric_limits<double>::infinity()};
+}
+
+// After a run of steps in rows: nobody goes back behind it any more.
+void Simulation::settle() {
+  const LookConstants constants = look_constants();
+  parallel(static_cast<int>(batches_.size()), [&](int index) {
+    const Batch& b = batches_[static_cast<std::size_t>(index)];
+    Particles& p = particles_;
+    const auto first = static_cast<std::size_t>(b.first);
+    kernels_.settle({p.rows.data() + row_size * first, p.x.data() + first, p.y.data() + first, p.z.data() + first, p.vx.data() + first, p.vy.data() + first, p.vz.data() + first,
+                     p.ux.data() + first, p.uy.data() + first, p.uz.data() + first, inner_.of.data() + first, outer_.of.data() + first, b.count},
+                    constants);
+  });
+}
+
 // Takes off the room of each sphere what it has moved in the last run of steps: where that began is still kept, for going back.
 LookTotals Simulation::look_at_spheres() {
-  const LookConstants constants{domain_.width, domain_.inverse_width, domain_.depth, domain_.inverse_depth,
-                                {drift_since_look_[0], drift_since_look_[1], drift_since_look_[2]}, {mean_[0], mean_[1], mean_[2]}, std::numeric_limits<double>::infinity()};
+  const LookConstants constants = look_constants();
   std::vector<LookTotals> found(batches_.size());
   parallel(static_cast<int>(batches_.size()), [&](int index) {
     const Batch& b = batches_[static_cast<std::size_t>(index)];
@@ -273,9 +290,13 @@ Simulation::Ways Simulation::look_back(int steps) {
       now.sum += speed2;
     }
     std::size_t k = range.first;
-    for (; k + 8 <= range.last; k += 8)
-      for (std::size_t lane = 0; lane < 8; ++lane) now.odd[lane] += 0.0 * (p.ux[k + lane] + p.uy[k + lane] + p.uz[k + lane]);
-    for (; k < range.last; ++k) now.odd[0] += 0.0 * (p.ux[k] + p.uy[k] + p.uz[k]);
+    if (moves_in_rows_) {
+      for (const double* u = p.rows.data() + row_size * k + 8; k < range.last; ++k, u += row_size) now.odd[k % 8] += 0.0 * (u[0] + u[1] + u[2]);
+    } else {
+      for (; k + 8 <= range.last; k += 8)
+        for (std::size_t lane = 0; lane < 8; ++lane) now.odd[lane] += 0.0 * (p.ux[k + lane] + p.uy[k + lane] + p.uz[k + lane]);
+      for (; k < range.last; ++k) now.odd[0] += 0.0 * (p.ux[k] + p.uy[k] + p.uz[k]);
+    }
     found[static_cast<std::size_t>(part)] = now;
   });
   std::size_t within = 0;
@@ -302,7 +323,9 @@ bool Simulation::unlisted_apart(int steps, const std::vector<char>& beyond) cons
   const auto n = static_cast<std::size_t>(particles_.count);
   const double factor = dt_ * std::sqrt(steps * rounded_speeds), rounding = 1e-9 * largest_radius_;
   const auto way = [&](std::size_t k) { return factor * std::sqrt(static_cast<double>(speed2_[k])) + rounding; };
-  const AlignedArray<double>* const columns[3] = {&saved_->x, &saved_->y, &saved_->z};
+  const Saved& s = *saved_;
+  const Particles& p = particles_;
+  const AlignedArray<double>* const columns[3] = {moves_in_rows_ ? &p.x : &s.x, moves_in_rows_ ? &p.y : &s.y, moves_in_rows_ ? &p.z : &s.z};
   const auto before = [&](std::size_t k, std::size_t axis) { return (*columns[axis])[k]; };
   const double planes_moved = plane_path(steps);
   for (std::size_t k = 0; k < n; ++k) {
@@ -380,7 +403,7 @@ void Simulation::cut_into_batches(const PairHistories& pairs, const std::int32_t
   const Ownership ownership = engine_.fused ? Ownership::by_colour : Ownership::ahead;
   batches_ = make_batches(particles_, domain_, outer_, cuts, ownership, kernels_, run);
   fill_inner(batches_, particles_, domain_, inner_, keeps_k_t(), pairs, bucket, kernels_, run);
-  const double bytes = touched_bytes(batches_);
+  const double bytes = touched_bytes_with_columns(batches_);
   asks_ahead_ = bytes > 0.5 * engine_.cache * engine_.threads;
   asks_history_ = bytes > 2.0 * engine_.cache;
 }
@@ -459,7 +482,8 @@ void Simulation::open_sides() {
 
 void Simulation::make_room_to_save() {
   Saved& s = *saved_;
-  for (auto* column : {&s.x, &s.y, &s.z, &s.vx, &s.vy, &s.vz, &s.ux, &s.uy, &s.uz}) column->resize_to_overwrite(particles_.x.size());
+  if (!moves_in_rows_)
+    for (auto* column : {&s.x, &s.y, &s.z, &s.vx, &s.vy, &s.vz, &s.ux, &s.uy, &s.uz}) column->resize_to_overwrite(particles_.x.size());
   s.image.resize_to_overwrite(particles_.image.size());
   s.batches.resize(batches_.size());
   parallel(static_cast<int>(batches_.size()), [&](int k) {
@@ -478,15 +502,21 @@ void copy_part(const Batch& b, const AlignedArray<double>& from, AlignedArray<do
 void Simulation::save_positions(const Batch& b) {
   Saved& s = *saved_;
   const Particles& p = particles_;
-  copy_part(b, p.x, s.x), copy_part(b, p.y, s.y), copy_part(b, p.z, s.z);
+  if (!moves_in_rows_) copy_part(b, p.x, s.x), copy_part(b, p.y, s.y), copy_part(b, p.z, s.z);
   std::copy_n(p.image.data() + 2 * b.first, 2 * b.count, s.image.data() + 2 * b.first);
 }
 
 void Simulation::save_velocities(const Batch& b) {
   Saved& s = *saved_;
-  const Particles& p = particles_;
-  copy_part(b, p.vx, s.vx), copy_part(b, p.vy, s.vy), copy_part(b, p.vz, s.vz);
-  copy_part(b, p.ux, s.ux), copy_part(b, p.uy, s.uy), copy_part(b, p.uz, s.uz);
+  Particles& p = particles_;
+  if (moves_in_rows_) {
+    AlignedArray<double>* const columns[6] = {&p.vx, &p.vy, &p.vz, &p.ux, &p.uy, &p.uz};
+    for (auto k = static_cast<std::size_t>(b.first); k < static_cast<std::size_t>(b.first + b.count); ++k)
+      for (std::size_t m = 0; m < 6; ++m) (*columns[m])[k] = p.rows[row_size * k + 4 + m + m / 3];
+  } else {
+    copy_part(b, p.vx, s.vx), copy_part(b, p.vy, s.vy), copy_part(b, p.vz, s.vz);
+    copy_part(b, p.ux, s.ux), copy_part(b, p.uy, s.uy), copy_part(b, p.uz, s.uz);
+  }
   Saved::OfBatch& to = s.batches[static_cast<std::size_t>(&b - batches_.data())];
   to.rolling = b.rolling, to.out_of_range = b.out_of_range;
 }
@@ -500,9 +530,11 @@ void Simulation::save_history(Batch& b) {
 void Simulation::restore() {
   Saved& s = *saved_;
   Particles& p = particles_;
-  p.x.swap(s.x), p.y.swap(s.y), p.z.swap(s.z);
-  p.vx.swap(s.vx), p.vy.swap(s.vy), p.vz.swap(s.vz);
-  p.ux.swap(s.ux), p.uy.swap(s.uy), p.uz.swap(s.uz);
+  if (!moves_in_rows_) {
+    p.x.swap(s.x), p.y.swap(s.y), p.z.swap(s.z);
+    p.vx.swap(s.vx), p.vy.swap(s.vy), p.vz.swap(s.vz);
+    p.ux.swap(s.ux), p.uy.swap(s.uy), p.uz.swap(s.uz);
+  }
   p.image.swap(s.image);
   p.write_rows(on_workers());
   for (std::size_t k = 0; k < batches_.size(); ++k) {

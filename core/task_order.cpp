@@ -190,7 +190,7 @@ TaskOrder order_for_cache(const TaskTable& table, const std::vector<Batch>& batc
 }
 
 double order_if_large(TaskTable& table, const std::vector<Batch>& batches, double bytes, int workers, const ParallelFor& parallel) {
-  const double touched = touched_bytes(batches), of_batch = touched / static_cast<double>(std::max<std::size_t>(batches.size(), 1));
+  const double touched = touched_bytes_with_columns(batches), of_batch = touched / static_cast<double>(std::max<std::size_t>(batches.size(), 1));
   if (touched <= 2.0 * bytes || 256.0 * of_batch <= bytes) return 0.0;
   const bool parts = workers > 1 && batches.size() >= least_batches_of_worker * static_cast<std::size_t>(workers);
   // Up to eight cores share a third cache, of some three times what one may count on.

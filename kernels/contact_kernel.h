@@ -6,6 +6,7 @@
 #include "kernels/fetch_phase.h"
 #include "kernels/law_phase.h"
 #include "kernels/output_phase.h"
+#include "kernels/staged_owners.h"
 
 namespace platen {
 
@@ -14,7 +15,7 @@ namespace platen {
 template <class I, SceneTraits scene, bool exact, bool guarded = true>
 void contact_kernel(const PairBatch& batch, const LawConstants& constants, PairTotals& totals) noexcept {
   using Wide = typename Interleaved<I>::Type;
-  const PairBatch b = batch;  // copies, which no store through a pointer can change
+  const PairBatch b = with_staged_owners<I, scene>(batch);  // copies, which no store through a pointer can change
   const LawConstants c = constants;
   typename I::Record carried = I::zero_record();
   std::int32_t next = 0;  // contact after the last one whose owner's sum is carried; -1: none

@@ -3,20 +3,10 @@
 #pragma once
 
 #include "kernels/chunk.h"
+#include "kernels/rows.h"
 
 namespace platen {
 
-// Four numbers of the row of each of `width` spheres: part 0 x y z R, 1 vx vy vz m, 2 ux uy uz 1/R.
-template <class I>
-struct RowPart {
-  typename I::Real of[4];
-};
-template <class I, int unit>
-PLATEN_INLINE RowPart<I> fetch_part(const double* rows, int part, const std::int32_t* place) {
-  RowPart<I> f;
-  I::template fetch_rows<unit>(rows + 4 * part, place, f.of);
-  return f;
-}
 // The owner side. Consecutive contacts share owners, and owners follow each other along the curve: eight contacts mostly
 // have theirs within eight places, which one load and one permutation per field bring.
 template <class I, SceneTraits scene, int parts>

@@ -11,6 +11,7 @@
 #include "kernels/motion_kernel.h"
 #include "kernels/plate_kernel.h"
 #include "kernels/search_kernel.h"
+#include "kernels/settle_kernel.h"
 
 namespace platen {
 
@@ -70,6 +71,7 @@ KernelTable kernels_of(InstructionSet set, const KernelRequest& request) {
   table.search = &search_kernel<I>;
   table.choose = &choose_kernel<I>;
   table.look = &look_kernel<I>;
+  table.settle = &settle_kernel<I>;
   return table;
 }
 

@@ -19,6 +19,7 @@ struct KernelTable {
   int (*search)(const SearchMembers&, const SearchRange*, int count, const SearchedSphere&, std::int32_t* found) noexcept = nullptr;
   void (*choose)(const ChooseBatch&) noexcept = nullptr;
   void (*look)(const LookBatch&, const LookConstants&, LookTotals&) noexcept = nullptr;
+  void (*settle)(const SettleBatch&, const LookConstants&) noexcept = nullptr;
   InstructionSet instruction_set = InstructionSet::scalar;
   int scene = 0;             // index into built_scenes
   bool energy = true;        // sums of the ledger are formed

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "kernels/rolling.h"
+#include "kernels/rows.h"
 #include "kernels/views.h"
 
 namespace platen {
@@ -16,7 +17,8 @@ PLATEN_INLINE void ask_for_spheres(const MotionBatch& b, std::int64_t k) {
   constexpr std::int64_t line = 8;
   for (std::int64_t lane = 0; lane < I::width; ++lane) __builtin_prefetch(b.sum + record_size * (k + lane), 1);
   for (std::int64_t m = 0; m < row_size * I::width; m += line) __builtin_prefetch(b.rows + row_size * k + m, 1);
-  for (const double* column : {b.x, b.y, b.z, b.vx, b.vy, b.vz, b.ux, b.uy, b.uz}) __builtin_prefetch(column + k, 1);
+  if (b.x != nullptr)
+    for (const double* column : {b.x, b.y, b.z, b.vx, b.vy, b.vz, b.ux, b.uy, b.uz}) __builtin_prefetch(column + k, 1);
   __builtin_prefetch(b.speed2 + k, 1);
   if constexpr (!equal_spheres)
     for (const double* column : {b.inverse_mass, b.mass, b.radius, b.inverse_radius}) __builtin_prefetch(column + k);
@@ -29,6 +31,7 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
   Real fastest = zero;    // speed, squared
   Real rolled = zero;
   Real strongest = zero;  // largest force on a sphere, squared
+  const bool in_rows = b.x == nullptr;
   for (std::int32_t k = 0; k < b.count; k += I::width) {
     if (I::width > 1 && b.asks && k + 4 * I::width < b.count) ask_for_spheres<I, equal_spheres>(b, k + 4 * I::width);
     typename I::Record records[I::width];
@@ -53,11 +56,21 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
       inverse_R = I::load(b.inverse_radius + k);
     }
 
-    Vec3<I> v = {I::load(b.vx + k), I::load(b.vy + k), I::load(b.vz + k)};
+    double* row = b.rows + row_size * static_cast<std::int64_t>(k);
+    Vec3<I> x, v, u;
+    if (in_rows) {
+      const RowPart<I> places = fetch_next_rows<I>(row, 0), velocities = fetch_next_rows<I>(row, 1), spins = fetch_next_rows<I>(row, 2);
+      x = {places.of[0], places.of[1], places.of[2]};
+      v = {velocities.of[0], velocities.of[1], velocities.of[2]};
+      u = {spins.of[0], spins.of[1], spins.of[2]};
+    } else {
+      x = {I::load(b.x + k), I::load(b.y + k), I::load(b.z + k)};
+      v = {I::load(b.vx + k), I::load(b.vy + k), I::load(b.vz + k)};
+      u = {I::load(b.ux + k), I::load(b.uy + k), I::load(b.uz + k)};
+    }
     const Vec3<I> acceleration = {f[0] * inverse_m, f[1] * inverse_m, f[2] * inverse_m - I::set(c.gravity)};
     v = add_scaled<I>(v, kick, acceleration);
 
-    Vec3<I> u = {I::load(b.ux + k), I::load(b.uy + k), I::load(b.uz + k)};
     const Vec3<I> u_before = u;
     const Real turn = (I::set(2.5) * inverse_m) * kick;
     u = add_scaled<I>(u, turn, Vec3<I>{f[4], f[5], f[6]});
@@ -77,8 +90,6 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
       }
     }
 
-
-    Vec3<I> x = {I::load(b.x + k), I::load(b.y + k), I::load(b.z + k)};
     x = add_scaled<I>(x, drift, v);
     const auto wrap = [&](Real& coordinate, double length, int axis) {
       const Real L = I::set(length);
@@ -92,10 +103,11 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
     };
     if (c.width > 0.0) wrap(x.x, c.width, 0), wrap(x.y, c.depth, 1);
 
-    I::store(b.vx + k, v.x), I::store(b.vy + k, v.y), I::store(b.vz + k, v.z);
-    I::store(b.ux + k, u.x), I::store(b.uy + k, u.y), I::store(b.uz + k, u.z);
-    I::store(b.x + k, x.x), I::store(b.y + k, x.y), I::store(b.z + k, x.z);
-    double* row = b.rows + row_size * static_cast<std::int64_t>(k);
+    if (!in_rows) {
+      I::store(b.vx + k, v.x), I::store(b.vy + k, v.y), I::store(b.vz + k, v.z);
+      I::store(b.ux + k, u.x), I::store(b.uy + k, u.y), I::store(b.uz + k, u.z);
+      I::store(b.x + k, x.x), I::store(b.y + k, x.y), I::store(b.z + k, x.z);
+    }
     I::scatter4(row, 0, {x.x, x.y, x.z, R});
     I::scatter4(row, 4, {v.x, v.y, v.z, m});
     I::scatter4(row, 8, {u.x, u.y, u.z, inverse_R});

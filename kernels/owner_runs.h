@@ -23,7 +23,7 @@ PLATEN_INLINE void find_owners(const std::int32_t* i, std::int32_t count, std::i
   for (std::int32_t k = 0; k < count; k += 8) {
     OwnersOfEight& of = owners[k / 8];
     const std::int32_t from = i[k] < end - 8 ? i[k] : end - 8;  // all eight places are the batch's own
-    of.first = from >= first && i[k + 7] - from < 8 ? from : -1;
+    of.first = from >= first && i[k + 7] - from < 8 ? from - first : -1;
     for (std::int32_t lane = 0; lane < 8; ++lane) of.place[lane] = static_cast<std::uint8_t>(i[k + lane] - from);
   }
 }

@@ -1,7 +1,8 @@
 // What kernels see: plain pointers and numbers, owned by core.
 //
 // A particle's row, twelve doubles (96 bytes), written by the motion kernel, read by the contact kernels. The state
-// itself is kept as a structure of arrays; the row is its copy in the shape that a contact fetches with three loads:
+// itself is kept as a structure of arrays; the row is its copy in the shape that a contact fetches with three loads.
+// While a large bed makes a run of steps the rows alone hold the state [docs/architecture.md, "Data"].
 //
 //     x  y  z  R | vx vy vz m | ux uy uz 1/R        u = R omega [m/s]
 //
@@ -82,7 +83,7 @@ inline constexpr std::int32_t most_spheres_of_batch = 1 << 18;  // whose sums li
 
 // The owners of eight contacts that follow each other: mostly within eight places, which one load of a column brings.
 struct OwnersOfEight {
-  std::int32_t first;     // of such eight places; -1 where they are farther apart
+  std::int32_t first;     // of such eight places, counted from the batch's first particle; -1 where they are farther apart
   std::uint8_t place[8];  // of each contact's owner from there
 };
 
@@ -106,13 +107,17 @@ struct PairBatch {
   std::int32_t nothing; // place of the record that stays zero, in bytes from `sum`
   bool dense;           // most touched in the pass before: none is looked for that could be left out, which changes no bit
   double leap;          // bound of the change of any pair's distance in the last step [m]
-  const double *x, *y, *z, *vx, *vy, *vz, *ux, *uy, *uz;  // the state itself, for the owner side
+  const double *x, *y, *z, *vx, *vy, *vz, *ux, *uy, *uz;  // state of the batch's spheres, for the owner side; null where rows alone hold it
+  double* stage;         // then memory for nine columns of stage_column(end - first); null otherwise
   std::int32_t ahead;    // partners are asked for so many places ahead of their owners; 0 where a near cache holds the bed, few touch, or not asking is quicker
   std::int32_t spheres;  // that have rows
   bool asks_history;     // of contacts as well, where no cache holds the bed
   const AskedLines* lines;  // for others [core/task_asks.h], so many of them with each chunk
   std::int32_t stretches, lines_of_chunk;
 };
+
+// Such columns start at different places of a page.
+inline constexpr std::int64_t stage_column(std::int64_t spheres) { return spheres + padding; }
 
 // Shares that another batch holds of spheres of this one: records in a row.
 struct SharesBatch {
@@ -163,6 +168,13 @@ struct LookBatch {
   float *inner, *outer;                    // what each may still move before either list is made anew; its way since then is taken off [m]
   float* speed2;                           // set to 0
   std::int32_t count, particles;           // multiple of padding; of them particles
+};
+// Spheres of a batch whose columns are given the state of their rows, and that have moved since the columns had it.
+struct SettleBatch {
+  const double* rows;
+  double *x, *y, *z, *vx, *vy, *vz, *ux, *uy, *uz;
+  float *inner, *outer;
+  std::int32_t count;  // multiple of padding
 };
 struct LookConstants {
   double width, inverse_width, depth, inverse_depth;  // periodic lengths; 0 where not periodic
@@ -225,7 +237,7 @@ struct MotionConstants {
 };
 
 struct MotionBatch {
-  double *x, *y, *z, *vx, *vy, *vz, *ux, *uy, *uz;
+  double *x, *y, *z, *vx, *vy, *vz, *ux, *uy, *uz;               // null where rows alone hold the state
   const double *inverse_mass, *mass, *radius, *inverse_radius;  // null where spheres are equal
   double* rows;            // of this batch's first particle
   std::int32_t* image;     // 2 per particle

@@ -21,7 +21,8 @@ struct Pass {
   }
 };
 // `ahead`: partners are asked for so far ahead, and history with them; 0: nobody asks. `others`: what tasks to come need.
-inline Pass pass(const Simulation& sim, const Batch& b, bool dense, double leap_bound, std::int32_t ahead = 0, const StretchesOfLines& others = {}) {
+// `in_rows`: the batch's columns have to be made from its rows first.
+inline Pass pass(const Simulation& sim, const Batch& b, bool dense, double leap_bound, std::int32_t ahead = 0, const StretchesOfLines& others = {}, bool in_rows = false) {
   const FloatMode mode;
   const Particles& p = sim.state();
   const auto copied = [](const AlignedArray<double>& from) {
@@ -35,9 +36,12 @@ inline Pass pass(const Simulation& sim, const Batch& b, bool dense, double leap_
   LawConstants law = sim.law();
   law.dt = sim.time_step();
   const auto nothing = static_cast<std::int32_t>(sum.size() * sizeof(double)) - record_bytes;
+  AlignedArray<double> stage;
+  if (in_rows) stage.resize(static_cast<std::size_t>(9 * stage_column(b.count)));
+  const auto state = [&](const AlignedArray<double>& column) { return in_rows ? nullptr : column.data() + b.first; };
   PairBatch pairs{p.rows.data(), b.i.data(), b.row_j.data(), b.to.data(), b.owners_of_eight.data(), sp.data(), tx.data(), ty.data(), tz.data(),
                   k_t.empty() ? nullptr : k_t.data(), sum.data(), b.first, b.padded, b.first + b.count, nothing, dense, leap_bound,
-                  p.x.data(), p.y.data(), p.z.data(), p.vx.data(), p.vy.data(), p.vz.data(), p.ux.data(), p.uy.data(), p.uz.data(), ahead, p.padded, ahead != 0, nullptr, 0, 0};
+                  state(p.x), state(p.y), state(p.z), state(p.vx), state(p.vy), state(p.vz), state(p.ux), state(p.uy), state(p.uz), stage.data(), ahead, p.padded, ahead != 0, nullptr, 0, 0};
   others.put_into(pairs);
   Pass found;
   sim.kernels().contacts(pairs, law, found.totals);

@@ -165,9 +165,9 @@ TEST(OwnerRuns, OwnersOfEight) {
   find_owners(i, 24, first, end, owners);
   EXPECT_EQ(owners[1].first, -1) << "24 to 32";
   for (const int group : {0, 2}) {
-    EXPECT_GE(owners[group].first, first);
-    EXPECT_LE(owners[group].first, end - 8);
-    for (int lane = 0; lane < 8; ++lane) EXPECT_EQ(owners[group].first + owners[group].place[lane], i[8 * group + lane]);
+    EXPECT_GE(owners[group].first, 0);
+    EXPECT_LE(owners[group].first, end - 8 - first);
+    for (int lane = 0; lane < 8; ++lane) EXPECT_EQ(first + owners[group].first + owners[group].place[lane], i[8 * group + lane]);
   }
 }
 

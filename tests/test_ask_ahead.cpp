@@ -25,6 +25,8 @@ TEST(AskAhead, ChangesNoBit) {
         const Pass silent = pass(sim, b, true, sim.leap_of(b, 2e-6));
         // Within the batch, beyond its end, and beyond all spheres.
         for (const std::int32_t ahead : {1, 64, 300, 5000}) EXPECT_TRUE(silent == pass(sim, b, true, sim.leap_of(b, 2e-6), ahead)) << ahead;
+        EXPECT_TRUE(silent == pass(sim, b, true, sim.leap_of(b, 2e-6), 0, {}, true)) << "owners from rows alone";
+        EXPECT_TRUE(pass(sim, b, false, sim.leap_of(b, 2e-6)) == pass(sim, b, false, sim.leap_of(b, 2e-6), 0, {}, true)) << "owners from rows alone, some passed over";
         StretchesOfLines others;
         for (const Batch& other : sim.batches()) others.add(other.tx.data(), other.tx.size(), 0.0, 1.0);
         EXPECT_GT(others.lines(), 0);

@@ -91,15 +91,17 @@ Pairs listed(Simulation& sim) {
 }
 
 TEST(Lists, NoPairIsMissedAtAnySpeed) {
-  std::int64_t redone = 0, spared = 0;
+  std::int64_t redone = 0, spared = 0, redone_in_rows = 0, spared_in_rows = 0;
   for (Scene scene : fast_scenes()) {
     SCOPED_TRACE(scene.name);
     scene.setup.engine.instruction_set = available_instruction_sets().back();
     scene.setup.engine.batch = 32;
     // Chunks of 32 over lists as the engine sees fit, one step at a time over the same lists, and one step at a time
-    // with new lists before each.
-    Simulation chunks(scene.setup), single(scene.setup), fresh(scene.setup);
-    begin(chunks, scene), begin(single, scene), begin(fresh, scene);
+    // with new lists before each; and chunks as beds make them that no cache holds.
+    SimulationSetup large = scene.setup;
+    large.engine.cache = 1.0;
+    Simulation chunks(scene.setup), single(scene.setup), fresh(scene.setup), in_rows(large);
+    begin(chunks, scene), begin(single, scene), begin(fresh, scene), begin(in_rows, scene);
     std::size_t met = 0;
     Pairs before = touching(single, scene.setup);
     for (int step = 1; step <= scene.steps; ++step) {
@@ -112,8 +114,9 @@ TEST(Lists, NoPairIsMissedAtAnySpeed) {
       for (const auto& pair : all) met += before.count(pair) == 0 ? 1 : 0;
       before = all;
       if (step % 32 != 0) continue;
-      chunks.advance(32);
+      chunks.advance(32), in_rows.advance(32);
       const std::uint64_t hash = fresh.state_hash();
+      ASSERT_EQ(in_rows.state_hash(), hash) << "step " << step;
       ASSERT_EQ(chunks.state_hash(), hash) << "step " << step;
       ASSERT_EQ(single.state_hash(), hash) << "step " << step;
       ASSERT_EQ(chunks.measure().energy_residual, fresh.measure().energy_residual) << "step " << step;
@@ -123,9 +126,12 @@ TEST(Lists, NoPairIsMissedAtAnySpeed) {
     RecordProperty(std::string("redone, ") + scene.name, static_cast<int>(chunks.counters().redone_steps));
     redone += chunks.counters().redone_steps;
     spared += chunks.counters().spared_steps;
+    redone_in_rows += in_rows.counters().redone_steps, spared_in_rows += in_rows.counters().spared_steps;
   }
   EXPECT_GT(redone, 0) << "the way back was never taken";
   EXPECT_GT(spared, 0) << "no sphere went beyond its margin where it could meet nobody";
+  EXPECT_GT(redone_in_rows, 0);
+  EXPECT_GT(spared_in_rows, 0);
 }
 
 // Spheres that are pushed onto a plate which they are not listed with, where no other sphere is near: it counts as a neighbour
@@ -219,15 +225,20 @@ TEST(Lists, StepsDoneAgainLeaveNoTrace) {
     SimulationSetup other = setup;
     other.engine.inner_gap = 0.8 * o.R, other.engine.skin = o.R, other.engine.unroll = 1;
     setup.engine.inner_gap = 1e-3 * o.R, setup.engine.threads = 2;
-    Simulation narrow(setup), wide(other);
-    for (Simulation* sim : {&narrow, &wide}) {
+    SimulationSetup large = setup;
+    large.engine.cache = 1.0;
+    Simulation narrow(setup), wide(other), in_rows(large);
+    for (Simulation* sim : {&narrow, &wide, &in_rows}) {
       sim->set_time_step(1e-5);
       scenes::add_plates(*sim, z_top, -0.2);
       sim->count_inserted();
       sim->advance(320);
     }
     EXPECT_GT(narrow.counters().redone_steps, 0);
+    EXPECT_GT(in_rows.counters().redone_steps, 0);
     EXPECT_EQ(narrow.state_hash(), wide.state_hash());
+    EXPECT_EQ(in_rows.state_hash(), wide.state_hash());
+    EXPECT_EQ(in_rows.measure().energy_residual, wide.measure().energy_residual);
     const Measures a = narrow.measure(), b = wide.measure();
     EXPECT_EQ(a.energy_residual, b.energy_residual);
     EXPECT_EQ(a.ledger.dissipated(), b.ledger.dissipated());

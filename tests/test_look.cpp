@@ -78,6 +78,43 @@ TEST(Look, SeesWhatOneSphereAtATimeSees) {
   }
 }
 
+// Columns get what rows hold, and rooms become what a look with these columns would have made of them.
+TEST(Look, WhatMovedInRowsIsSettled) {
+  for (const InstructionSet set : available_instruction_sets()) {
+    const KernelTable kernels = choose_kernels(set, {});
+    for (const std::uint64_t seed : {1, 2}) {
+      Spheres s(seed), looked(seed);
+      std::vector<double> u[3];
+      scenes::Sequence random(7 + seed);
+      for (auto& column : u)
+        for (std::int32_t k = 0; k < count; ++k) column.push_back(random.next());
+      std::vector<double> rows;
+      for (std::size_t k = 0; k < count; ++k)
+        for (const double of : {s.x[k], s.y[k], s.z[k], -1.0, s.vx[k], s.vy[k], s.vz[k], -2.0, u[0][k], u[1][k], u[2][k], -3.0}) rows.push_back(of);
+      LookTotals totals;
+      kernels.look(looked.batch(true), constants, totals);
+      const LookBatch b = s.batch(true);
+      Spheres columns(seed + 10);
+      std::vector<double> spins[3] = {std::vector<double>(count, -1.0), std::vector<double>(count, -1.0), std::vector<double>(count, -1.0)};
+      columns.x = s.then_x, columns.y = s.then_y, columns.z = s.then_z;
+      kernels.settle({rows.data(), columns.x.data(), columns.y.data(), columns.z.data(), columns.vx.data(), columns.vy.data(), columns.vz.data(), spins[0].data(), spins[1].data(),
+                      spins[2].data(), b.inner, b.outer, count},
+                     constants);
+      EXPECT_EQ(columns.x, s.x);
+      EXPECT_EQ(columns.y, s.y);
+      EXPECT_EQ(columns.z, s.z);
+      EXPECT_EQ(columns.vx, s.vx);
+      EXPECT_EQ(columns.vy, s.vy);
+      EXPECT_EQ(columns.vz, s.vz);
+      for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(spins[axis], u[axis]);
+      for (std::size_t k = 0; k < particles; ++k) {
+        EXPECT_EQ(s.room[k], looked.room[k]);
+        EXPECT_EQ(s.outer[k], looked.outer[k]);
+      }
+    }
+  }
+}
+
 // Spheres with much room, one of them fast with little, and one in the same lane of any vector that is nowhere.
 TEST(Look, ASphereThatIsNowhereHidesNoOther) {
   for (const InstructionSet set : available_instruction_sets())
