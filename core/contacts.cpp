@@ -159,15 +159,15 @@ PairHistories pair_history(const std::vector<Batch>& batches, const Particles& p
       if (has_history(b, k)) ++all.start[static_cast<std::size_t>(b.i[k]) + 1];
   });
   for (std::size_t k = 1; k < all.start.size(); ++k) all.start[k] += all.start[k - 1];
-  all.pairs.resize(static_cast<std::size_t>(all.start.back()));
+  all.pairs.resize_to_overwrite(static_cast<std::size_t>(all.start.back()));
   in_batches([&](const Batch& b) {
     if (b.first >= p.count) return;
-    auto to = all.pairs.begin() + all.start[static_cast<std::size_t>(b.first)];  // lists are sorted by owner
+    auto to = static_cast<std::size_t>(all.start[static_cast<std::size_t>(b.first)]);  // lists are sorted by owner
     for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k) {
       if (!has_history(b, k)) continue;
       const std::int32_t ri = p.rank[static_cast<std::size_t>(b.i[k])], rj = p.rank[static_cast<std::size_t>(b.j(k))];
       const double sign = ri < rj ? 1.0 : -1.0;
-      *to++ = {std::min(ri, rj), std::max(ri, rj), b.sp[k], sign * b.tx[k], sign * b.ty[k], sign * b.tz[k],
+      all.pairs[to++] = {std::min(ri, rj), std::max(ri, rj), b.sp[k], sign * b.tx[k], sign * b.ty[k], sign * b.tz[k],
                b.k_t_last.empty() ? 0.0 : b.k_t_last[k]};
     }
   });

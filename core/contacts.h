@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/batches.h"
+#include "core/chunked.h"
 #include "core/neighbours.h"
 #include "core/particles.h"
 #include "core/plates.h"
@@ -31,7 +32,7 @@ struct PlateHistory {
 // All pairs with history, each in the bucket of one of its spheres.
 struct PairHistories {
   PooledVector<std::int32_t> start;  // bucket s: pairs start[s] .. start[s + 1]
-  PooledVector<PairHistory> pairs;
+  ChunkedArray<PairHistory> pairs;
   bool by_place = false;             // a sphere's bucket is its place when they were gathered, as they lie there; else its rank
 };
 

@@ -503,7 +503,7 @@ void Simulation::advance(std::int64_t steps) {
   while (steps > 0) {
     const int n = prepare_lists(std::min<std::int64_t>(steps, one_by_one ? 1 : at_most));
     prepare_graph();
-    make_room_to_save();  // for the lists as they are now
+    make_room_to_save();
     run_chunk(n);
     bool bad = kicked_out_of_range_;
     for (const Batch& b : batches_) bad = bad || b.out_of_range;

@@ -174,12 +174,12 @@ class Simulation {
   void rebuild_with(const PairHistories& pairs);
   int batch_count(bool even) const;
   void cut_into_batches(const PairHistories& pairs, const std::int32_t* bucket, const Cuts& cuts);
-  void rebuild_from(const PairHistories& pairs, const std::vector<PlateHistory>& plates, const AlignedArray<double>* sums);
+  void rebuild_from(const PairHistories& pairs, const std::vector<PlateHistory>& plates, const ChunkedArray<double>* sums);
   void take_sides_away();
   void prune_lists();
   void merge_all();
-  void keep_sums(AlignedArray<double>& sums);
-  void put_sums(const AlignedArray<double>& sums);
+  void keep_sums(ChunkedArray<double>& sums);
+  void put_sums(const ChunkedArray<double>& sums);
   LookConstants look_constants() const;
   LookTotals look_at_spheres();
   void settle();
@@ -261,6 +261,7 @@ class Simulation {
   double mean_[3] = {0, 0, 0};                  // common velocity taken out of displacements [m/s]
   double drift_since_look_[3] = {0, 0, 0};      // displacement by mean_ since lists were last looked at [m]
   double plane_moved_ = 0.0;     // bound of the planes' motion since the prune [m]
+  bool rebuilt_ = false;         // since the last run of steps
   bool lists_stale_ = false;     // prune before the next step
   bool moved_since_look_ = false;
   bool moves_in_rows_ = false;   // in runs of steps of this table; particles_'s columns keep where they began until that is settled

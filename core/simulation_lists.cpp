@@ -32,25 +32,25 @@ void Simulation::merge_all() {
 }
 
 // Total of each particle's sums, by rank: forces outlive the batches they were found with.
-void Simulation::keep_sums(AlignedArray<double>& sums) {
+void Simulation::keep_sums(ChunkedArray<double>& sums) {
   sums.resize_to_overwrite(static_cast<std::size_t>(particles_.count) * record_size);
   merge_all();
   parallel(static_cast<int>(batches_.size()), [&](int k) {
     const Batch& b = batches_[static_cast<std::size_t>(k)];
     for (std::int32_t m = 0; m < b.count && b.first + m < particles_.count; ++m) {
       const auto rank = static_cast<std::size_t>(particles_.rank[static_cast<std::size_t>(b.first + m)]);
-      std::copy_n(b.sum.data() + record_size * static_cast<std::size_t>(m), record_size, sums.data() + record_size * rank);
+      std::copy_n(b.sum.data() + record_size * static_cast<std::size_t>(m), record_size, &sums[record_size * rank]);
     }
   });
 }
 
-void Simulation::put_sums(const AlignedArray<double>& sums) {
+void Simulation::put_sums(const ChunkedArray<double>& sums) {
   merged_.assign(batches_.size(), 1);
   parallel(static_cast<int>(batches_.size()), [&](int k) {
     Batch& b = batches_[static_cast<std::size_t>(k)];
     for (std::int32_t m = 0; m < b.count && b.first + m < particles_.count; ++m) {
       const auto rank = static_cast<std::size_t>(particles_.rank[static_cast<std::size_t>(b.first + m)]);
-      std::copy_n(sums.data() + record_size * rank, record_size, b.sum.data() + record_size * static_cast<std::size_t>(m));
+      std::copy_n(&sums[record_size * rank], record_size, b.sum.data() + record_size * static_cast<std::size_t>(m));
     }
   });
 }
@@ -382,11 +382,14 @@ void Simulation::prune_lists() {
   ++counters_.prunes;
 }
 
-void Simulation::rebuild() { rebuild_with(pair_history(batches_, particles_, on_workers())); }
+void Simulation::rebuild() {
+  *saved_ = {};  // nobody goes back behind a rebuild: meanwhile others may use the memory
+  rebuild_with(pair_history(batches_, particles_, on_workers()));
+}
 
 void Simulation::rebuild_with(const PairHistories& pairs) {
-  *saved_ = {};  // nobody goes back behind a rebuild: meanwhile others may use the memory
-  AlignedArray<double> sums;
+  *saved_ = {};
+  ChunkedArray<double> sums;
   const bool had_forces = !batches_.empty();
   if (had_forces) keep_sums(sums);
   rebuild_from(pairs, plate_history(batches_, particles_), had_forces ? &sums : nullptr);
@@ -409,7 +412,7 @@ void Simulation::cut_into_batches(const PairHistories& pairs, const std::int32_t
 }
 
 // `sums`: forces by rank; null where there are none yet.
-void Simulation::rebuild_from(const PairHistories& pairs, const std::vector<PlateHistory>& plates, const AlignedArray<double>* sums) {
+void Simulation::rebuild_from(const PairHistories& pairs, const std::vector<PlateHistory>& plates, const ChunkedArray<double>* sums) {
   const ParallelFor run = on_workers();
   // Several threads share the work of a bed in the cache; the batches of a larger one go where there is room [core/task_order.h].
   const bool shared = engine_.threads > 1 && particles_.count <= particles_in_cache;
@@ -436,6 +439,7 @@ void Simulation::rebuild_from(const PairHistories& pairs, const std::vector<Plat
   prepare_graph();
   start_from_here();
   lists_valid_ = true;
+  rebuilt_ = true;
   ++counters_.rebuilds;
   counters_.batches = static_cast<int>(batches_.size());
 }
@@ -463,16 +467,18 @@ void Simulation::open_sides() {
   PairHistories kept;
   kept.by_place = all.by_place;
   kept.start.assign(1, 0);
+  std::vector<PairHistory> left;
   for (std::size_t bucket = 0; bucket + 1 < all.start.size(); ++bucket) {
     for (std::int32_t k = all.start[bucket]; k < all.start[bucket + 1]; ++k) {
       const PairHistory& h = all.pairs[static_cast<std::size_t>(k)];
       const auto a = static_cast<std::size_t>(particles_.place[static_cast<std::size_t>(h.low)]);
       const auto b = static_cast<std::size_t>(particles_.place[static_cast<std::size_t>(h.high)]);
       const double dx = particles_.x[a] - particles_.x[b], dy = particles_.y[a] - particles_.y[b];
-      if (domain_.nearest_x(dx) == dx && domain_.nearest_y(dy) == dy) kept.pairs.push_back(h);
+      if (domain_.nearest_x(dx) == dx && domain_.nearest_y(dy) == dy) left.push_back(h);
     }
-    kept.start.push_back(static_cast<std::int32_t>(kept.pairs.size()));
+    kept.start.push_back(static_cast<std::int32_t>(left.size()));
   }
+  kept.pairs.assign(left);
   take_sides_away();
   rebuild_with(kept);
   add_pair_energy(after);
@@ -480,6 +486,7 @@ void Simulation::open_sides() {
   forces_valid_ = false;
 }
 
+// For the lists as they are now.
 void Simulation::make_room_to_save() {
   Saved& s = *saved_;
   if (!moves_in_rows_)
@@ -490,6 +497,9 @@ void Simulation::make_room_to_save() {
     for_each_history(batches_[static_cast<std::size_t>(k)], [&](std::size_t size) { s.batches[static_cast<std::size_t>(k)].history.resize_to_overwrite(size); },
                      [](double*, std::size_t, std::size_t) {});
   });
+  // What a rebuild has taken besides is as large as a third of the bed, and lies there unused for hundreds of steps.
+  if (rebuilt_ && moves_in_rows_) trim_pool();
+  rebuilt_ = false;
 }
 
 namespace {

@@ -232,7 +232,7 @@ std::int64_t Simulation::carry_down(double z, double speed) {
 
 Snapshot Simulation::snapshot(bool with_contacts) {
   const FloatMode mode;
-  AlignedArray<double> sums;
+  ChunkedArray<double> sums;
   ensure_forces();
   keep_sums(sums);
   Snapshot out;
@@ -248,7 +248,7 @@ Snapshot Simulation::snapshot(bool with_contacts) {
   for (std::size_t rank = 0; rank < n; ++rank) {
     const auto k = static_cast<std::size_t>(p.place[rank]);
     const double R = p.radius_of(p.place[rank]), m = p.mass_of(p.place[rank]);
-    const double* s = sums.data() + record_size * rank;
+    const double* s = &sums[record_size * rank];
     f.radius[rank] = R, f.mass[rank] = m;
     const double x[3] = {p.x[k], p.y[k], p.z[k]}, v[3] = {p.vx[k], p.vy[k], p.vz[k]}, u[3] = {p.ux[k], p.uy[k], p.uz[k]};
     double spin[3], size2 = 0.0;
@@ -352,7 +352,7 @@ std::uint64_t Simulation::state_hash(const std::string& extra) {
     for (const auto* column : {&p.x, &p.y, &p.z, &p.vx, &p.vy, &p.vz, &p.ux, &p.uy, &p.uz}) number((*column)[k]);
     put(p.image.data() + 2 * k, 2 * sizeof(std::int32_t));
   }
-  PooledVector<PairHistory> pairs = pair_history(batches_, particles_).pairs;
+  std::vector<PairHistory> pairs = pair_history(batches_, particles_).pairs.in_a_row();
   std::sort(pairs.begin(), pairs.end(),
             [](const PairHistory& a, const PairHistory& b) { return std::tie(a.low, a.high) < std::tie(b.low, b.high); });
   for (const PairHistory& h : pairs) {

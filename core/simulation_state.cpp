@@ -15,7 +15,7 @@ SimulationState Simulation::whole_state() {
   // Forces that are due are left due: to find them once more than without a checkpoint could change a last bit, where a spring
   // is cut to its limit twice.
   if (batches_.empty()) ensure_forces();
-  AlignedArray<double> sums;
+  ChunkedArray<double> sums;
   keep_sums(sums);
   SimulationState s;
   const Particles& p = particles_;
@@ -28,9 +28,8 @@ SimulationState Simulation::whole_state() {
     s.turning.insert(s.turning.end(), {p.ux[k], p.uy[k], p.uz[k]});
     s.image.insert(s.image.end(), {p.image[2 * k], p.image[2 * k + 1]});
   }
-  s.sums.assign(sums.data(), sums.data() + sums.size());
-  const PairHistories pairs = pair_history(batches_, p);
-  s.pairs.assign(pairs.pairs.begin(), pairs.pairs.end());
+  s.sums = sums.in_a_row();
+  s.pairs = pair_history(batches_, p).pairs.in_a_row();
   std::sort(s.pairs.begin(), s.pairs.end(), [](const PairHistory& a, const PairHistory& b) { return std::tie(a.low, a.high) < std::tie(b.low, b.high); });
   s.plates = plate_history(batches_, p);
   s.planes = planes_;
@@ -78,10 +77,9 @@ void Simulation::take_up(const SimulationState& s) {
   pairs.start.assign(n + 1, 0);
   for (const PairHistory& h : s.pairs) ++pairs.start[static_cast<std::size_t>(h.low) + 1];
   for (std::size_t k = 1; k <= n; ++k) pairs.start[k] += pairs.start[k - 1];
-  pairs.pairs.assign(s.pairs.begin(), s.pairs.end());
-  AlignedArray<double> sums;
-  sums.resize(s.sums.size());
-  std::copy(s.sums.begin(), s.sums.end(), sums.data());
+  pairs.pairs.assign(s.pairs);
+  ChunkedArray<double> sums;
+  sums.assign(s.sums);
   rebuild_from(pairs, s.plates, &sums);
   forces_valid_ = s.forces_valid, law_.dt = plate_law_.dt = s.forces_dt;
   counters_.rebuilds = s.rebuilds, counters_.prunes = s.prunes, counters_.redone_steps = s.redone_steps;

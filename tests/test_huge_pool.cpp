@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/aligned.h"
+#include "core/chunked.h"
 #include "core/huge_pool.h"
 
 namespace platen {
@@ -167,6 +168,23 @@ TEST(PooledVector, KeepsItsContentAtEverySize) {
     EXPECT_EQ(v.back(), -1);
     EXPECT_TRUE(std::equal(v.begin(), v.end() - 1, copy.begin()));
     EXPECT_EQ(copy.back(), static_cast<std::int64_t>(2 * size - 1));
+  }
+}
+
+// Pieces are whole but for the last, and hold what an array in a row would.
+TEST(Chunked, HoldsWhatARowWould) {
+  constexpr std::size_t piece = ChunkedArray<std::int32_t>::piece;
+  for (const std::size_t size : {std::size_t{0}, std::size_t{1}, piece - 1, piece, piece + 1, 3 * piece + 7}) {
+    std::vector<std::int32_t> row;
+    for (std::size_t k = 0; k < size; ++k) row.push_back(static_cast<std::int32_t>(7 * k));
+    ChunkedArray<std::int32_t> chunked;
+    chunked.resize_to_overwrite(5 * piece);
+    chunked.assign(row);
+    ASSERT_EQ(chunked.size(), size);
+    for (std::size_t k = 0; k < size; ++k) ASSERT_EQ(chunked[k], row[k]);
+    if (size > 0) chunked[size - 1] = -1, row[size - 1] = -1;
+    EXPECT_EQ(chunked.in_a_row(), row);
+    for (std::size_t k = 0; k + 8 <= size; k += 8) ASSERT_EQ(&chunked[k + 7] - &chunked[k], 7) << "eight of a record";
   }
 }
 
