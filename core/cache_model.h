@@ -13,9 +13,9 @@ namespace platen {
 double state_bytes(const Batch& batch);
 // Of each contact: its history and lists [bytes].
 double contact_bytes(const Batch& batch);
-// What a step touches of these batches [bytes].
+// What a step of a bed that moves in its rows touches of these batches [bytes].
 double touched_bytes(const std::vector<Batch>& batches);
-// The same of a bed that does not move in its rows alone, by which it is decided whether it is large.
+// The same with columns, by which it is decided whether it is large.
 double touched_bytes_with_columns(const std::vector<Batch>& batches);
 
 // What part of a batch a task needs that no cache holds.

@@ -168,7 +168,7 @@ PairHistories pair_history(const std::vector<Batch>& batches, const Particles& p
       const std::int32_t ri = p.rank[static_cast<std::size_t>(b.i[k])], rj = p.rank[static_cast<std::size_t>(b.j(k))];
       const double sign = ri < rj ? 1.0 : -1.0;
       all.pairs[to++] = {std::min(ri, rj), std::max(ri, rj), b.sp[k], sign * b.tx[k], sign * b.ty[k], sign * b.tz[k],
-               b.k_t_last.empty() ? 0.0 : b.k_t_last[k]};
+                         b.k_t_last.empty() ? 0.0 : b.k_t_last[k]};
     }
   });
   return all;

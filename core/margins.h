@@ -17,7 +17,7 @@ struct Margins {
   double largest = 0.0;     // [m]
 };
 
-// The largest numbers of single precision below x >= 0, or one or two below that.
+// A number of single precision not above x >= 0, the largest or the one or two next to it.
 inline float rounded_down(double x) { return static_cast<float>(x * (1.0 - 0x1p-23)); }
 
 }  // namespace platen

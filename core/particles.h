@@ -14,7 +14,8 @@ struct Particles {
   std::int32_t padded = 0;  // N rounded up to whole vectors; the rest rests at the origin and touches nothing
   bool equal = true;        // one radius and one mass: no columns for them
 
-  // What a step needs.
+  // What a step needs. While a large bed makes a run of steps the rows alone hold the state, and the first nine columns what the run goes
+  // back to.
   AlignedArray<double> x, y, z;     // [m], wrapped into a periodic box
   AlignedArray<double> vx, vy, vz;  // half-step velocity [m/s]
   AlignedArray<double> ux, uy, uz;  // R omega at the half step [m/s]

@@ -339,7 +339,7 @@ void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, 
   PairBatch pairs{particles_.rows.data(), b.i.data(), b.row_j.data(), b.to.data(), b.owners_of_eight.data(), b.sp.data(), b.tx.data(),
                   b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum.data(), b.first, b.padded, b.first + b.count, nothing, dense, leap,
                   state(particles_.x), state(particles_.y), state(particles_.z), state(particles_.vx), state(particles_.vy), state(particles_.vz), state(particles_.ux),
-                  state(particles_.uy), state(particles_.uz), moves_in_rows_ ? stage_of_this_thread(b.count) : nullptr, dense && asks_for_partners() ? b.ahead : 0, particles_.padded, asks_history_, nullptr, 0, 0};
+                  state(particles_.uy), state(particles_.uz), moves_in_rows_ && kernels_.stages ? stage_of_this_thread(b.count) : nullptr, dense && asks_for_partners() ? b.ahead : 0, particles_.padded, asks_history_, nullptr, 0, 0};
   if (asked != nullptr) asked->put_into(pairs);
   b.pair_totals.contacts = 0;
   kernels_.contacts(pairs, law, b.pair_totals);
@@ -466,8 +466,8 @@ void Simulation::prepare_table() {
   table_ = std::make_unique<TaskTable>(batches_, unroll_, engine_.fused);
   const bool in_graph = engine_.executor == Executor::flow_graph, alone = engine_.threads == 1 || engine_.executor == Executor::serial;
   const double cache = order_if_large(*table_, batches_, engine_.cache, in_graph ? engine_.threads : 1, on_workers());
-  // A worker asks for what it will itself take next; where anybody may take a task nobody knows who that is.
   moves_in_rows_ = cache > 0.0;
+  // A worker asks for what it will itself take next; where anybody may take a task nobody knows who that is.
   if (cache > 0.0 && (alone || !table_->worker().empty())) asks_ = asks_of_tasks(*table_, batches_, asked_beyond * cache);
   // Batches of a few spheres, which only a case file asks for, would make long tables of who waits for whom.
   const auto threads = static_cast<std::size_t>(engine_.threads);
@@ -536,7 +536,7 @@ void Simulation::advance(std::int64_t steps) {
         continue;
       }
       step_ += n;
-      if (moves_in_rows_) settle();  // what is still written tells of where it ended
+      if (moves_in_rows_) settle();  // the message tells of spheres as they are now
       fail("forces or velocities out of range");
     }
     collect();

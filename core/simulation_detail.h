@@ -17,7 +17,7 @@ struct Simulation::Workers {
 // What a run of steps goes back to: not to where it began, but behind its first kick. There forces have done what they were found
 // for, so that none need be kept; the first step once more is a drift. Tasks of the first step save what is theirs while it is at hand.
 struct Simulation::Saved {
-  // Empty where the run moves in rows: then the particles' own columns keep this.
+  // These nine are empty where the run moves in rows: then the particles' own columns keep that.
   AlignedArray<double> x, y, z;                          // before the first step
   AlignedArray<double> vx, vy, vz, ux, uy, uz;           // after its kick
   AlignedArray<std::int32_t> image;

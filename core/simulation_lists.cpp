@@ -15,7 +15,8 @@ namespace {
 constexpr double smallest_inner = 0.003, smallest_outer = 0.08;
 constexpr double widest = 0.5;
 constexpr double caution = 1.2;           // speeds may grow until the lists are looked at again
-constexpr double rounded_speeds = 1.0001;  // sums of squared speeds are of single precision
+// What rounding may have taken off a sum of that many squared speeds, of single precision. (Speeds below 1e-19 m/s count as none.)
+double with_rounding(int steps) { return 1.0 + steps * 0x1p-23; }
 constexpr int shortest_horizon = 16, longest_horizon = 512;  // steps from prune to prune
 constexpr int outer_life = 16;             // horizons from rebuild to rebuild of a bed in steady motion
 constexpr int worthwhile = 8;             // steps that lists must still hold, lest they are made anew
@@ -272,7 +273,7 @@ int Simulation::look(int wanted) {
 // listed with. The way of a sphere is at most dt sqrt(steps sum of v^2).
 Simulation::Ways Simulation::look_back(int steps) {
   const auto n = static_cast<std::size_t>(particles_.count);
-  const double factor = steps * dt_ * dt_ * rounded_speeds;
+  const double factor = steps * dt_ * dt_ * with_rounding(steps);
   struct Found {
     std::size_t within = 0;
     double sum = 0.0;  // a number only if all are
@@ -314,6 +315,7 @@ Simulation::Ways Simulation::look_back(int steps) {
   }
   if (!unlisted_apart(steps, beyond)) return Ways::too_long;
   counters_.spared_steps += steps;
+  lists_stale_ = true;  // some sphere has no room left
   return Ways::within_margins;
 }
 
@@ -321,7 +323,7 @@ Simulation::Ways Simulation::look_back(int steps) {
 // went `beyond` their margins: most often it is one that was pushed, between others that hardly moved.
 bool Simulation::unlisted_apart(int steps, const std::vector<char>& beyond) const {
   const auto n = static_cast<std::size_t>(particles_.count);
-  const double factor = dt_ * std::sqrt(steps * rounded_speeds), rounding = 1e-9 * largest_radius_;
+  const double factor = dt_ * std::sqrt(steps * with_rounding(steps)), rounding = 1e-9 * largest_radius_;
   const auto way = [&](std::size_t k) { return factor * std::sqrt(static_cast<double>(speed2_[k])) + rounding; };
   const Saved& s = *saved_;
   const Particles& p = particles_;
@@ -388,7 +390,7 @@ void Simulation::rebuild() {
 }
 
 void Simulation::rebuild_with(const PairHistories& pairs) {
-  *saved_ = {};
+  *saved_ = {};  // also where sides are taken away
   ChunkedArray<double> sums;
   const bool had_forces = !batches_.empty();
   if (had_forces) keep_sums(sums);

@@ -65,6 +65,7 @@ KernelTable kernels_of(InstructionSet set, const KernelRequest& request) {
                                   : contact_of_scene<I, false, false>(table.scene, scenes);
     table.plates = &plate_kernel<I, false>;
   }
+  table.stages = I::picks && equal_spheres;
   table.motion = table.energy ? motion_of<I, true>(equal_spheres, request.rolling)
                               : motion_of<I, false>(equal_spheres, request.rolling);
   table.merge = &merge_kernel<I>;

@@ -22,6 +22,7 @@ struct KernelTable {
   void (*settle)(const SettleBatch&, const LookConstants&) noexcept = nullptr;
   InstructionSet instruction_set = InstructionSet::scalar;
   int scene = 0;             // index into built_scenes
+  bool stages = false;       // contacts need PairBatch::stage where rows alone hold the state
   bool energy = true;        // sums of the ledger are formed
   bool reproducible = false; // IEEE operations only: the same bits on every instruction set
 };

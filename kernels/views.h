@@ -1,6 +1,6 @@
 // What kernels see: plain pointers and numbers, owned by core.
 //
-// A particle's row, twelve doubles (96 bytes), written by the motion kernel, read by the contact kernels. The state
+// A particle's row, twelve doubles (96 bytes), written by the motion kernel, read by the contact kernels and others. The state
 // itself is kept as a structure of arrays; the row is its copy in the shape that a contact fetches with three loads.
 // While a large bed makes a run of steps the rows alone hold the state [docs/architecture.md, "Data"].
 //
