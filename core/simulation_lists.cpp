@@ -499,7 +499,7 @@ void Simulation::make_room_to_save() {
     for_each_history(batches_[static_cast<std::size_t>(k)], [&](std::size_t size) { s.batches[static_cast<std::size_t>(k)].history.resize_to_overwrite(size); },
                      [](double*, std::size_t, std::size_t) {});
   });
-  // What a rebuild has taken besides is as large as a third of the bed, and lies there unused for hundreds of steps.
+  // What a rebuild has taken besides lies there unused for hundreds of steps.
   if (rebuilt_ && moves_in_rows_) trim_pool();
   rebuilt_ = false;
 }
