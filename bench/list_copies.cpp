@@ -20,7 +20,7 @@ StateCopy::StateCopy(const Particles& p)
       radius(copy_of(p.radius)),
       inverse_radius(copy_of(p.inverse_radius)),
       rows(copy_of(p.rows)),
-      image(copy_of(p.image)) {}
+      crossed(copy_of(p.crossed)) {}
 
 PlateBatch PlateCopy::view(const StateCopy& state) {
   return {state.rows.data(),     particle.data(), xi_x.data(),    xi_y.data(), xi_z.data(),
@@ -28,8 +28,7 @@ PlateBatch PlateCopy::view(const StateCopy& state) {
 }
 
 BatchCopy::BatchCopy(const Batch& b)
-    : i(copy_of(b.i)),
-      row_j(copy_of(b.row_j)),
+    : row_j(copy_of(b.row_j)),
       targets(copy_of(b.to)),
       owners(copy_of(b.owners_of_eight)),
       sp(copy_of(b.sp)),
@@ -62,7 +61,7 @@ BatchCopy::BatchCopy(const Batch& b)
 PairBatch BatchCopy::pairs(const StateCopy& state) {
   PairBatch b{};
   b.rows = state.rows.data();
-  b.i = i.data(), b.row_j = row_j.data(), b.to = targets.data(), b.owners = owners.data();
+  b.row_j = row_j.data(), b.to = targets.data(), b.owners = owners.data();
   b.sp = sp.data(), b.tx = tx.data(), b.ty = ty.data(), b.tz = tz.data();
   b.k_t_last = k_t_last.empty() ? nullptr : k_t_last.data();
   b.sum = sum.data();
@@ -94,7 +93,7 @@ MotionBatch BatchCopy::motion(StateCopy& s, bool clears) {
           column(s.radius),
           column(s.inverse_radius),
           s.rows.data() + row_size * at,
-          s.image.data() + 2 * at,
+          s.crossed.data() + 2 * at,
           sum.data(),
           clears,
           speed2.data(),
@@ -104,13 +103,13 @@ MotionBatch BatchCopy::motion(StateCopy& s, bool clears) {
 
 std::int64_t BatchCopy::list_bytes() const {
   const std::int64_t history = k_t_last.empty() ? 4 : 5;
-  const auto pair = static_cast<std::int64_t>(2 * sizeof(std::int32_t) + sizeof(PairTargets)) + 2 * history * static_cast<std::int64_t>(sizeof(double));
+  const auto pair = static_cast<std::int64_t>(sizeof(std::int32_t) + sizeof(PairTargets)) + 2 * history * static_cast<std::int64_t>(sizeof(double));
   return padded * pair + padded / 8 * static_cast<std::int64_t>(sizeof(OwnersOfEight));
 }
 
 std::int64_t BatchCopy::row_bytes() const {
   std::vector<std::int32_t> spheres;
-  for (const std::int32_t k : i) spheres.push_back(row_size * k);
+  for (const PairTargets& to : targets) spheres.push_back(row_size * (first + owner_of(to)));
   spheres.insert(spheres.end(), row_j.begin(), row_j.end());
   std::sort(spheres.begin(), spheres.end());
   const auto distinct = std::unique(spheres.begin(), spheres.end()) - spheres.begin();

@@ -19,7 +19,7 @@ AlignedArray<T> copy_of(const AlignedArray<T>& from) {
 struct StateCopy {
   explicit StateCopy(const Particles& p);
   AlignedArray<double> x, y, z, vx, vy, vz, ux, uy, uz, inverse_mass, mass, radius, inverse_radius, rows;
-  AlignedArray<std::int32_t> image;
+  AlignedArray<std::int8_t> crossed;
 };
 
 struct PlateCopy {
@@ -32,7 +32,7 @@ struct PlateCopy {
 
 struct BatchCopy {
   explicit BatchCopy(const Batch& b);
-  AlignedArray<std::int32_t> i, row_j;
+  AlignedArray<std::int32_t> row_j;
   AlignedArray<PairTargets> targets;
   AlignedArray<OwnersOfEight> owners;
   AlignedArray<double> sp, tx, ty, tz, k_t_last, sum;

@@ -52,6 +52,7 @@ class AlignedArray {
     size_ = size;
   }
   void assign(std::size_t size, T value) {
+    if (size > capacity_) *this = AlignedArray();  // first: what is there serves nobody any more
     size_ = 0;
     reserve(size);
     std::fill(data_, data_ + size, value);

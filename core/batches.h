@@ -13,7 +13,9 @@
 #include <vector>
 
 #include "core/aligned.h"
+#include "core/owned_counts.h"
 #include "core/snapshot.h"
+#include "kernels/owner_runs.h"
 #include "kernels/views.h"
 
 namespace platen {
@@ -37,13 +39,15 @@ struct Batch {
   int colour = 0;                     // 0 for all unless it decides who owns a pair
   double centre[3] = {0, 0, 0};       // of its spheres when the lists were made [m]
 
-  PooledVector<std::int32_t> outer_i, outer_j;
+  OwnedCounts outer_owned;  // outer pairs of each sphere, and their partners
+  PooledVector<std::int32_t> outer_j;
   AlignedArray<std::uint64_t> listed;  // a bit for each outer pair: set where it is in the inner list
 
   std::int32_t used = 0, padded = 0;  // pairs of the inner list
-  AlignedArray<std::int32_t> i, row_j;  // kernels/views.h
+  AlignedArray<std::int32_t> row_j;  // kernels/views.h
   AlignedArray<PairTargets> to;
   AlignedArray<OwnersOfEight> owners_of_eight;  // one for each eight pairs
+  std::int32_t i(std::size_t k) const { return first + owner_of(to[k]); }
   std::int32_t j(std::size_t k) const { return row_j[k] / row_size; }
   AlignedArray<double> sp, tx, ty, tz, k_t_last;
   std::int32_t ahead = 0;               // PairBatch::ahead, if it is asked for

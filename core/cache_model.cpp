@@ -5,13 +5,13 @@
 namespace platen {
 
 double state_bytes(const Batch& b) {
-  const double sphere = sizeof(double) * (row_size + record_size) + sizeof(float) + 2 * sizeof(std::int32_t);
+  const double sphere = sizeof(double) * (row_size + record_size) + sizeof(float);
   return sphere * b.count + record_bytes * static_cast<double>(b.halo.size());
 }
 
 double contact_bytes(const Batch& b) {
   const double history = sizeof(double) * (b.k_t_last.empty() ? 4 : 5);
-  return (history + 2 * sizeof(std::int32_t) + sizeof(PairTargets) + sizeof(OwnersOfEight) / 8.0) * static_cast<double>(b.padded);
+  return (history + sizeof(std::int32_t) + sizeof(PairTargets) + sizeof(OwnersOfEight) / 8.0) * static_cast<double>(b.padded);
 }
 
 double touched_bytes(const std::vector<Batch>& batches) {

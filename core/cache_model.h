@@ -9,7 +9,7 @@
 
 namespace platen {
 
-// Of each sphere: its row, which alone holds the state while steps have an order, its sums, its image and speed [bytes].
+// Of each sphere: its row, which alone holds the state while steps have an order, its sums and speed [bytes].
 double state_bytes(const Batch& batch);
 // Of each contact: its history and lists [bytes].
 double contact_bytes(const Batch& batch);

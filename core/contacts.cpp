@@ -28,25 +28,30 @@ struct Closer {
   const Domain& domain;
   const Margins& margins;
   const KernelTable& kernels;
-  void choose(const Batch& b, std::uint64_t* chosen) const {
-    kernels.choose({particles.rows.data(), margins.of.data(), b.outer_i.data(), b.outer_j.data(), static_cast<std::int64_t>(b.outer_j.size()),
+  void choose(const Batch& b, const std::int32_t* owners, std::uint64_t* chosen) const {
+    kernels.choose({particles.rows.data(), margins.of.data(), owners, b.outer_j.data(), static_cast<std::int64_t>(b.outer_j.size()),
                     domain.width, domain.inverse_width, domain.depth, domain.inverse_depth, chosen});
   }
 };
 
 // New inner list of one batch in the making; the same memory for every batch that a thread works on.
 struct Inner {
+  AlignedArray<std::int32_t> outer_i;                      // owners of the outer pairs
+  AlignedArray<std::int32_t> i;                            // and of those of the inner list, padded
   std::vector<std::int32_t> from;                          // places in the outer list, ascending
   AlignedArray<std::uint64_t> listed;                      // Batch::listed
   AlignedArray<double> sp, tx, ty, tz, k_t;                // signed from owner to partner
-  std::vector<std::int32_t> slot_of;                       // of foreign particles; -1 where none
+  std::vector<std::uint64_t> foreign;                      // pairs with particles of other batches: that particle, then the place in the list
+  std::vector<std::int32_t> halo;                          // these particles
   std::vector<std::int32_t> distances;                     // along the curve, of a sample of contacts
 
   // Starts a list of those outer pairs that are closer than their margins.
   void choose(const Batch& batch, const Closer& closer) {
     const std::size_t outer = batch.outer_j.size();
+    outer_i.resize_to_overwrite(outer);
+    batch.outer_owned.for_each([&](std::int32_t own, std::int32_t first, std::int32_t end) { std::fill(outer_i.data() + first, outer_i.data() + end, batch.first + own); });
     listed.renew((outer + 63) / 64, 0);
-    closer.choose(batch, listed.data());
+    closer.choose(batch, outer_i.data(), listed.data());
     from.resize(outer);
     std::size_t kept = 0;
     for (std::size_t word = 0; word < listed.size(); ++word)
@@ -55,8 +60,10 @@ struct Inner {
   }
   std::size_t padded() const { return (from.size() + pair_padding - 1) / pair_padding * pair_padding; }
   void clear_history(bool with_k_t) {
-    for (auto* column : {&sp, &tx, &ty, &tz}) column->renew(padded(), 0.0);
-    k_t.renew(with_k_t ? padded() : 0, 0.0);
+    // All of the last batch's are given back before any is taken: together they leave a gap that others fit in.
+    for (auto* column : {&sp, &tx, &ty, &tz, &k_t}) *column = AlignedArray<double>();
+    for (auto* column : {&sp, &tx, &ty, &tz}) column->assign(padded(), 0.0);
+    k_t.assign(with_k_t ? padded() : 0, 0.0);
   }
 };
 
@@ -70,7 +77,7 @@ Inner& inner_of_this_thread() {
 std::int32_t usual_distance(const Batch& batch, std::vector<std::int32_t>& distances) {
   constexpr std::int32_t in_time = 256, farthest = 4096;
   distances.clear();
-  for (std::size_t k = 0; k < static_cast<std::size_t>(batch.used); k += 16) distances.push_back(batch.j(k) - batch.i[k]);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(batch.used); k += 16) distances.push_back(batch.j(k) - batch.i(k));
   if (distances.empty()) return 0;
   const auto most = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() * 3 / 4);
   std::nth_element(distances.begin(), most, distances.end());
@@ -78,44 +85,44 @@ std::int32_t usual_distance(const Batch& batch, std::vector<std::int32_t>& dista
 }
 
 // Sums of the batch's own particles stay what they are; halo slots are empty afterwards.
-void install(Batch& batch, Inner& inner, const Particles& p) {
+void install(Batch& batch, Inner& inner) {
   batch.used = static_cast<std::int32_t>(inner.from.size());
   batch.padded = static_cast<std::int32_t>(inner.padded());
   const auto size = inner.padded();
-  for (auto* column : {&batch.i, &batch.row_j}) column->renew(size, 0);
+  inner.i.resize_to_overwrite(size);
+  batch.row_j.renew(size, 0);
   batch.to.renew(size, {});
   batch.sp.swap(inner.sp), batch.tx.swap(inner.tx), batch.ty.swap(inner.ty), batch.tz.swap(inner.tz);
   batch.k_t_last.swap(inner.k_t);
   batch.listed.swap(inner.listed);
 
-  inner.slot_of.resize(static_cast<std::size_t>(p.padded), -1);
-  batch.halo.clear();
+  inner.foreign.clear();
   for (std::size_t k = 0; k < inner.from.size(); ++k) {
     const auto m = static_cast<std::size_t>(inner.from[k]);
     const std::int32_t j = batch.outer_j[m], local = j - batch.first;
-    batch.i[k] = batch.outer_i[m];
+    inner.i[k] = inner.outer_i[m];
     batch.row_j[k] = row_size * j;
     batch.to[k].partner = record_bytes * local;
-    if (local >= 0 && local < batch.count) continue;
-    std::int32_t& slot = inner.slot_of[static_cast<std::size_t>(j)];
-    if (slot < 0) slot = 0, batch.halo.push_back(j);
+    if (local < 0 || local >= batch.count) inner.foreign.push_back(static_cast<std::uint64_t>(j) << 32 | k);
   }
-  std::sort(batch.halo.begin(), batch.halo.end());
-  for (std::size_t k = 0; k < batch.halo.size(); ++k)
-    inner.slot_of[static_cast<std::size_t>(batch.halo[k])] = batch.count + static_cast<std::int32_t>(k);
-  for (std::size_t k = 0; k < inner.from.size(); ++k)
-    if (const std::int32_t slot = inner.slot_of[static_cast<std::size_t>(batch.j(k))]; slot >= 0) batch.to[k].partner = record_bytes * slot;
-  for (const std::int32_t particle : batch.halo) inner.slot_of[static_cast<std::size_t>(particle)] = -1;
+  std::sort(inner.foreign.begin(), inner.foreign.end());
+  inner.halo.clear();
+  for (const std::uint64_t pair : inner.foreign) {
+    const auto j = static_cast<std::int32_t>(pair >> 32);
+    if (inner.halo.empty() || inner.halo.back() != j) inner.halo.push_back(j);
+    batch.to[pair & 0xffffffffu].partner = record_bytes * (batch.count + static_cast<std::int32_t>(inner.halo.size()) - 1);
+  }
+  batch.halo.assign(inner.halo.begin(), inner.halo.end());  // grows to what it needs, not to twice as much
   for (std::size_t k = inner.from.size(); k < size; ++k) {  // harmless repetitions: i with itself
-    batch.i[k] = batch.used > 0 ? batch.i[static_cast<std::size_t>(batch.used) - 1] : batch.first;
-    batch.row_j[k] = row_size * batch.i[k];
-    batch.to[k].partner = record_bytes * (batch.i[k] - batch.first);
+    inner.i[k] = batch.used > 0 ? inner.i[static_cast<std::size_t>(batch.used) - 1] : batch.first;
+    batch.row_j[k] = row_size * inner.i[k];
+    batch.to[k].partner = record_bytes * (inner.i[k] - batch.first);
   }
   const std::size_t own = static_cast<std::size_t>(batch.count) * record_size;
   const std::size_t nothing = own + batch.halo.size() * record_size;
-  find_owner_runs(batch.i.data(), batch.padded, batch.first, batch.to.data());
+  find_owner_runs(inner.i.data(), batch.padded, batch.first, batch.to.data());
   batch.owners_of_eight.renew(size / 8, {});
-  find_owners(batch.i.data(), batch.padded, batch.first, batch.first + batch.count, batch.owners_of_eight.data());
+  find_owners(inner.i.data(), batch.padded, batch.first, batch.first + batch.count, batch.owners_of_eight.data());
   batch.sum.reserve(nothing + record_size);
   batch.sum.resize(own);
   batch.sum.resize(nothing + record_size);
@@ -156,7 +163,7 @@ PairHistories pair_history(const std::vector<Batch>& batches, const Particles& p
   };
   in_batches([&](const Batch& b) {
     for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k)
-      if (has_history(b, k)) ++all.start[static_cast<std::size_t>(b.i[k]) + 1];
+      if (has_history(b, k)) ++all.start[static_cast<std::size_t>(b.i(k)) + 1];
   });
   for (std::size_t k = 1; k < all.start.size(); ++k) all.start[k] += all.start[k - 1];
   all.pairs.resize_to_overwrite(static_cast<std::size_t>(all.start.back()));
@@ -165,7 +172,7 @@ PairHistories pair_history(const std::vector<Batch>& batches, const Particles& p
     auto to = static_cast<std::size_t>(all.start[static_cast<std::size_t>(b.first)]);  // lists are sorted by owner
     for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k) {
       if (!has_history(b, k)) continue;
-      const std::int32_t ri = p.rank[static_cast<std::size_t>(b.i[k])], rj = p.rank[static_cast<std::size_t>(b.j(k))];
+      const std::int32_t ri = p.rank[static_cast<std::size_t>(b.i(k))], rj = p.rank[static_cast<std::size_t>(b.j(k))];
       const double sign = ri < rj ? 1.0 : -1.0;
       all.pairs[to++] = {std::min(ri, rj), std::max(ri, rj), b.sp[k], sign * b.tx[k], sign * b.ty[k], sign * b.tz[k],
                          b.k_t_last.empty() ? 0.0 : b.k_t_last[k]};
@@ -176,6 +183,10 @@ PairHistories pair_history(const std::vector<Batch>& batches, const Particles& p
 
 std::vector<PlateHistory> plate_history(const std::vector<Batch>& batches, const Particles& p) {
   std::vector<PlateHistory> all;
+  std::size_t listed = 0;
+  for (const Batch& b : batches)
+    for (const PlateList& list : b.plates) listed += static_cast<std::size_t>(list.used);
+  all.reserve(listed);
   for (const Batch& b : batches)
     for (int plate = 0; plate < plate_count; ++plate) {
       const PlateList& list = b.plates[plate];
@@ -211,11 +222,11 @@ void prune(std::vector<Batch>& batches, const Particles& p, const Domain& domain
         if (with_k_t) inner.k_t[to] = b.k_t_last[old];
       });
       for_each_bit(old_bits & ~bits, [&](int bit) {
-        if (const std::size_t old = old_first + place(old_bits, bit); has_history(b, old)) lost(p, b.i[old], b.j(old));
+        if (const std::size_t old = old_first + place(old_bits, bit); has_history(b, old)) lost(p, b.i(old), b.j(old));
       });
       old_first += static_cast<std::size_t>(std::popcount(old_bits)), first += static_cast<std::size_t>(std::popcount(bits));
     }
-    install(b, inner, p);
+    install(b, inner);
   });
   connect_halos(batches, parallel);
 }
@@ -231,7 +242,7 @@ void fill_inner(std::vector<Batch>& batches, const Particles& p, const Domain& d
     inner.clear_history(with_k_t);
     for (std::size_t to = 0; to < inner.from.size(); ++to) {
       const auto m = static_cast<std::size_t>(inner.from[to]);
-      const auto i = static_cast<std::size_t>(b.outer_i[m]), j = static_cast<std::size_t>(b.outer_j[m]);
+      const auto i = static_cast<std::size_t>(inner.outer_i[m]), j = static_cast<std::size_t>(b.outer_j[m]);
       const std::int32_t ri = p.rank[i], rj = p.rank[j], low = std::min(ri, rj), high = std::max(ri, rj);
       const auto found_in = [&](std::int32_t of) {
         for (std::int32_t h = history.start[static_cast<std::size_t>(of)]; h < history.start[static_cast<std::size_t>(of) + 1]; ++h) {
@@ -247,7 +258,7 @@ void fill_inner(std::vector<Batch>& batches, const Particles& p, const Domain& d
       // Who owns a pair mostly owned it before.
       found[static_cast<std::size_t>(k)] += found_in(bucket[i]) || found_in(bucket[j]) ? 1 : 0;
     }
-    install(b, inner, p);
+    install(b, inner);
   });
   std::int64_t carried = 0;
   for (std::int64_t n : found) carried += n;

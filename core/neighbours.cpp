@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace platen {
 
@@ -193,8 +194,8 @@ std::vector<Batch> make_batches(const Particles& p, const Domain& domain, const 
     find_centre(batch, p);
     std::vector<char> seen(static_cast<std::size_t>(count), 0);
     std::vector<std::int32_t> close;  // partners of one particle; grows to the most candidates that one had
-    PooledVector<std::int32_t> to_i, to_j;
-    to_i.reserve(static_cast<std::size_t>(batch.count) * 8), to_j.reserve(static_cast<std::size_t>(batch.count) * 8);
+    PooledVector<std::int32_t> partners;
+    partners.reserve(static_cast<std::size_t>(batch.count) * 8);
     for (std::int32_t i = batch.first; i < std::min(batch.first + batch.count, p.count); ++i) {
       const double own = p.radius_of(i) + margins.of[static_cast<std::size_t>(i)];
       SearchRange ranges[CellGrid::most_ranges];
@@ -204,10 +205,10 @@ std::vector<Batch> make_batches(const Particles& p, const Domain& domain, const 
       if (close.size() < candidates + padding) close.resize(candidates + padding);
       const auto kept = static_cast<std::size_t>(kernels.search(grid.members(), ranges, count_of_ranges, {own, static_cast<double>(i), static_cast<double>(batch.first)}, close.data()));
       for (std::size_t m = 0; count > 1 && m < kept; ++m) seen[static_cast<std::size_t>(batch_of[static_cast<std::size_t>(close[m] / padding)])] = 1;
-      to_i.insert(to_i.end(), kept, i);
-      to_j.insert(to_j.end(), close.begin(), close.begin() + static_cast<std::ptrdiff_t>(kept));
+      partners.insert(partners.end(), close.begin(), close.begin() + static_cast<std::ptrdiff_t>(kept));
+      batch.outer_owned.add(static_cast<std::int32_t>(kept));
     }
-    batch.outer_i.assign(to_i.begin(), to_i.end()), batch.outer_j.assign(to_j.begin(), to_j.end());  // no longer than they need be
+    batch.outer_j.assign(partners.begin(), partners.end());  // no longer than it need be
     for (int other = 0; other < count; ++other)
       if (other != k && seen[static_cast<std::size_t>(other)]) batch.partners.push_back(other);
   });
@@ -219,17 +220,23 @@ std::vector<Batch> make_batches(const Particles& p, const Domain& domain, const 
     };
     std::vector<char> shares(static_cast<std::size_t>(count), 0);
     std::size_t kept = 0;
-    for (std::size_t m = 0; m < batch.outer_j.size(); ++m) {
-      const std::int32_t i = batch.outer_i[m], j = batch.outer_j[m];
-      if (j < batch.first || j >= batch.first + batch.count) {
-        const int other = batch_of[static_cast<std::size_t>(j / padding)];
-        if (!owns(i, j, other)) continue;
-        shares[static_cast<std::size_t>(other)] = 1;
+    OwnedCounts owned;
+    batch.outer_owned.for_each([&](std::int32_t own, std::int32_t begin, std::int32_t end) {
+      const std::int32_t i = batch.first + own;
+      const std::size_t before = kept;
+      for (std::int32_t m = begin; m < end; ++m) {
+        const std::int32_t j = batch.outer_j[static_cast<std::size_t>(m)];
+        if (j < batch.first || j >= batch.first + batch.count) {
+          const int other = batch_of[static_cast<std::size_t>(j / padding)];
+          if (!owns(i, j, other)) continue;
+          shares[static_cast<std::size_t>(other)] = 1;
+        }
+        batch.outer_j[kept++] = j;
       }
-      batch.outer_i[kept] = i;
-      batch.outer_j[kept++] = j;
-    }
-    for (auto* column : {&batch.outer_i, &batch.outer_j}) column->resize(kept), column->shrink_to_fit();
+      owned.add(static_cast<std::int32_t>(kept - before));
+    });
+    batch.outer_owned = std::move(owned), batch.outer_owned.fit();
+    batch.outer_j.resize(kept), batch.outer_j.shrink_to_fit();
     std::erase_if(batch.partners, [&](int other) { return !shares[static_cast<std::size_t>(other)]; });
   });
   for (int k = 0; k < count; ++k)

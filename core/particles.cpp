@@ -1,6 +1,7 @@
 #include "core/particles.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "kernels/views.h"
 
@@ -17,9 +18,27 @@ void Particles::resize(std::int32_t n, bool equal_spheres) {
   for (auto* column : {&radius, &inverse_radius, &mass, &inverse_mass}) column->assign(equal ? 0 : size, 1.0);
   rows.assign(size * row_size, 0.0);
   rank.assign(size, -1);
-  place.assign(static_cast<std::size_t>(n), 0);
   image.assign(2 * size, 0);
-  id_of_rank.assign(static_cast<std::size_t>(n), 0);
+  crossed.assign(2 * size, 0);
+}
+
+std::vector<std::int32_t> Particles::places() const {
+  std::vector<std::int32_t> place(static_cast<std::size_t>(count));
+  for (std::int32_t k = 0; k < count; ++k) place[static_cast<std::size_t>(rank[static_cast<std::size_t>(k)])] = k;
+  return place;
+}
+
+void Particles::keep_crossings(std::int32_t first, std::int32_t spheres) {
+  constexpr std::size_t at_once = sizeof(std::uint64_t);
+  static_assert(2 * padding % at_once == 0);  // batches are whole vectors
+  const auto end = 2 * static_cast<std::size_t>(first + spheres);
+  for (auto k = 2 * static_cast<std::size_t>(first); k < end; k += at_once) {
+    std::uint64_t eight;
+    std::memcpy(&eight, crossed.data() + k, at_once);
+    if (eight == 0) continue;  // nearly always
+    for (std::size_t m = k; m < k + at_once; ++m) image[m] += crossed[m];
+    std::memset(crossed.data() + k, 0, at_once);
+  }
 }
 
 void Particles::permute(const std::vector<std::int32_t>& order, const ParallelFor& parallel) {
@@ -38,15 +57,15 @@ void Particles::permute(const std::vector<std::int32_t>& order, const ParallelFo
   for_each_in_stretches(n, parallel, [&](std::size_t k) {
     const auto from = static_cast<std::size_t>(order[k]);
     ranks[k] = rank[from];
-    images[2 * k] = image[2 * from];
-    images[2 * k + 1] = image[2 * from + 1];
+    images[2 * k] = boxes(from, 0);
+    images[2 * k + 1] = boxes(from, 1);
   });
   for_each_in_stretches(n, parallel, [&](std::size_t k) {
     rank[k] = ranks[k];
     image[2 * k] = images[2 * k];
     image[2 * k + 1] = images[2 * k + 1];
-    place[static_cast<std::size_t>(ranks[k])] = static_cast<std::int32_t>(k);
   });
+  std::fill(crossed.begin(), crossed.end(), std::int8_t{0});
   write_rows(parallel);
 }
 

@@ -2,12 +2,16 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "core/aligned.h"
+#include "core/ids.h"
 #include "core/parallel_for.h"
 
 namespace platen {
+
+inline constexpr int most_steps_of_run = std::numeric_limits<std::int8_t>::max();  // a sphere goes through a side at most once a step
 
 struct Particles {
   std::int32_t count = 0;   // N
@@ -25,12 +29,18 @@ struct Particles {
 
   // What it does not.
   std::vector<std::int32_t> rank;   // place of each particle in the order of ids
-  std::vector<std::int32_t> place;  // the inverse: where the particle of a rank stands now
-  AlignedArray<std::int32_t> image; // 2 per particle: box lengths left behind in x and y
-  std::vector<std::int64_t> id_of_rank;
+  Ids id_of_rank;
+  // Box lengths left behind in x and y, 2 per particle: until the last run of steps began, and since then. A run of at most
+  // most_steps_of_run goes back to where it began by forgetting the latter.
+  AlignedArray<std::int32_t> image;
+  AlignedArray<std::int8_t> crossed;
+  std::int32_t boxes(std::size_t p, std::size_t axis) const { return image[2 * p + axis] + crossed[2 * p + axis]; }
+  void keep_crossings(std::int32_t first, std::int32_t spheres);  // nobody goes back behind them any more
 
   double radius_of(std::int32_t p) const { return equal ? common_radius : radius[static_cast<std::size_t>(p)]; }
   double mass_of(std::int32_t p) const { return equal ? common_mass : mass[static_cast<std::size_t>(p)]; }
+
+  std::vector<std::int32_t> places() const;  // where the particle of each rank stands now
 
   void resize(std::int32_t n, bool equal_spheres);
   void permute(const std::vector<std::int32_t>& order, const ParallelFor& parallel = in_turn);  // order[new place] = old place

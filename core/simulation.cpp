@@ -36,6 +36,7 @@ Simulation::Simulation(SimulationSetup setup)
       gravity_(setup.gravity),
       saved_(std::make_unique<Saved>()) {
   const FloatMode mode;
+  engine_.unroll = std::clamp(engine_.unroll, 1, most_steps_of_run);
   if (setup.periodic) domain_ = {setup.width, setup.depth};
   setup_particles(setup.spheres);
   setup_laws(setup);
@@ -78,6 +79,7 @@ void Simulation::setup_particles(const SphereTable& table) {
   const bool columns = !built_scenes[static_cast<std::size_t>(kernels_.scene)].traits.equal_spheres;
 
   particles_.resize(static_cast<std::int32_t>(n), !columns);
+  std::vector<std::int64_t> ids(n);
   largest_radius_ = 0.0;
   smallest_radius_ = smallest_mass_ = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < n; ++k) {
@@ -86,8 +88,8 @@ void Simulation::setup_particles(const SphereTable& table) {
     largest_radius_ = std::max(largest_radius_, R);
     smallest_radius_ = std::min(smallest_radius_, R);
     smallest_mass_ = std::min(smallest_mass_, m);
-    particles_.id_of_rank[k] = table.id[from];
-    particles_.rank[k] = particles_.place[k] = static_cast<std::int32_t>(k);
+    ids[k] = table.id[from];
+    particles_.rank[k] = static_cast<std::int32_t>(k);
     double x = table.position[3 * from], y = table.position[3 * from + 1];
     if (domain_.width > 0.0) {  // a caller may pass unwrapped positions
       const auto wrap = [&](double& c, double length, std::size_t axis) {
@@ -112,6 +114,7 @@ void Simulation::setup_particles(const SphereTable& table) {
     }
     particles_.common_radius = R, particles_.common_mass = m;
   }
+  particles_.id_of_rank = Ids(std::move(ids));
   for (std::int32_t k = 0; k < particles_.count; ++k) {
     const double R = table.radius[order[static_cast<std::size_t>(k)]];
     solid_volume_ += sphere_mass(R, 1.0);
@@ -265,7 +268,7 @@ void Simulation::integrate(Batch& b, const MotionConstants& c, bool saves) {
   const auto state = [&](AlignedArray<double>& a) { return moves_in_rows_ ? nullptr : a.data() + first; };
   const MotionBatch batch{state(p.x), state(p.y), state(p.z), state(p.vx), state(p.vy), state(p.vz), state(p.ux),
                           state(p.uy), state(p.uz), column(p.inverse_mass), column(p.mass), column(p.radius),
-                          column(p.inverse_radius), p.rows.data() + row_size * first, p.image.data() + 2 * first,
+                          column(p.inverse_radius), p.rows.data() + row_size * first, p.crossed.data() + 2 * first,
                           b.sum.data(), true, speed2_.data() + first, b.count, asks_ahead_};
   MotionTotals totals;
   kernels_.motion(batch, c, totals);
@@ -274,7 +277,7 @@ void Simulation::integrate(Batch& b, const MotionConstants& c, bool saves) {
   for (auto k = filled; k < end; ++k) {
     for (auto* a : {&p.x, &p.y, &p.z, &p.vx, &p.vy, &p.vz, &p.ux, &p.uy, &p.uz}) (*a)[k] = 0.0;
     for (const std::size_t part : {0, 4, 8}) std::fill_n(p.rows.data() + row_size * k + part, 3, 0.0);
-    p.image[2 * k] = p.image[2 * k + 1] = 0;
+    p.crossed[2 * k] = p.crossed[2 * k + 1] = 0;
   }
   b.fastest = std::sqrt(totals.fastest2);
   b.rolling += totals.rolling;
@@ -336,7 +339,7 @@ void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, 
   const auto nothing = static_cast<std::int32_t>(b.sum.size() * sizeof(double)) - record_bytes;
   const bool dense = is_dense(b);
   const auto state = [&](const AlignedArray<double>& a) { return moves_in_rows_ ? nullptr : a.data() + b.first; };
-  PairBatch pairs{particles_.rows.data(), b.i.data(), b.row_j.data(), b.to.data(), b.owners_of_eight.data(), b.sp.data(), b.tx.data(),
+  PairBatch pairs{particles_.rows.data(), b.row_j.data(), b.to.data(), b.owners_of_eight.data(), b.sp.data(), b.tx.data(),
                   b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum.data(), b.first, b.padded, b.first + b.count, nothing, dense, leap,
                   state(particles_.x), state(particles_.y), state(particles_.z), state(particles_.vx), state(particles_.vy), state(particles_.vz), state(particles_.ux),
                   state(particles_.uy), state(particles_.uz), moves_in_rows_ && kernels_.stages ? stage_of_this_thread(b.count) : nullptr, dense && asks_for_partners() ? b.ahead : 0, particles_.padded, asks_history_, nullptr, 0, 0};
@@ -386,7 +389,7 @@ StretchesOfLines Simulation::lines_of(const std::vector<Asked>& asks) const {
       if (built_scenes[static_cast<std::size_t>(kernels_.scene)].traits.plasticity) add(b.sp.data(), listed);
       for (const auto* column : {&b.tx, &b.ty, &b.tz, &b.k_t_last})
         if (!column->empty()) add(column->data(), listed);
-      add(b.i.data(), listed), add(b.row_j.data(), listed), add(b.to.data(), listed), add(b.owners_of_eight.data(), listed / 8);
+      add(b.row_j.data(), listed), add(b.to.data(), listed), add(b.owners_of_eight.data(), listed / 8);
       continue;
     }
     // Only large beds ask, and those move in rows.

@@ -54,7 +54,7 @@ struct EngineOptions {
   double inner_gap = 0.0;   // [m]; 0 = chosen
   int batch = 0;            // particles; 0 = chosen
   int threads = 1;
-  int unroll = 32;          // most steps between two looks at the lists
+  int unroll = 32;          // most steps between two looks at the lists, up to most_steps_of_run
   bool reproducible = false;
   bool energy = true;
   int scene = -1;           // a built scene by number; -1: the cheapest that covers the case
@@ -261,7 +261,7 @@ class Simulation {
   double mean_[3] = {0, 0, 0};                  // common velocity taken out of displacements [m/s]
   double drift_since_look_[3] = {0, 0, 0};      // displacement by mean_ since lists were last looked at [m]
   double plane_moved_ = 0.0;     // bound of the planes' motion since the prune [m]
-  bool rebuilt_ = false;         // since the last run of steps
+  bool listed_ = false;          // lists were made since the last run of steps
   bool lists_stale_ = false;     // prune before the next step
   bool moved_since_look_ = false;
   bool moves_in_rows_ = false;   // in runs of steps of this table; particles_'s columns keep where they began until that is settled

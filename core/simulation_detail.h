@@ -4,6 +4,7 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
+#include "core/chunked.h"
 #include "core/simulation.h"
 
 namespace platen {
@@ -16,13 +17,13 @@ struct Simulation::Workers {
 
 // What a run of steps goes back to: not to where it began, but behind its first kick. There forces have done what they were found
 // for, so that none need be kept; the first step once more is a drift. Tasks of the first step save what is theirs while it is at hand.
+// Sides that were crossed since are forgotten [core/particles.h].
 struct Simulation::Saved {
   // These nine are empty where the run moves in rows: then the particles' own columns keep that.
   AlignedArray<double> x, y, z;                          // before the first step
   AlignedArray<double> vx, vy, vz, ux, uy, uz;           // after its kick
-  AlignedArray<std::int32_t> image;
   struct OfBatch {
-    AlignedArray<double> history;
+    ChunkedArray<double, 2048> history;  // in small pieces: they fit in where lists that came and went have left gaps
     std::int64_t contacts = 0;
     std::int64_t rolling = 0;    // of the kick: dissipated once, however often it is gone on from there [quanta]
     bool out_of_range = false;   // found in the kick

@@ -345,14 +345,19 @@ bool Simulation::unlisted_apart(int steps, const std::vector<char>& beyond) cons
     }
   }
   for (const Batch& b : batches_) {
-    for (std::size_t m = 0; m < b.outer_i.size(); ++m) {
-      if (b.listed[m / 64] >> (m % 64) & 1) continue;
-      const auto i = static_cast<std::size_t>(b.outer_i[m]), j = static_cast<std::size_t>(b.outer_j[m]);
-      if (!beyond[i] && !beyond[j]) continue;
-      const double dx = domain_.nearest_x(before(i, 0) - before(j, 0)), dy = domain_.nearest_y(before(i, 1) - before(j, 1));
-      const double apart = std::hypot(dx, dy, before(i, 2) - before(j, 2)) - particles_.radius_of(b.outer_i[m]) - particles_.radius_of(b.outer_j[m]);
-      if (!(way(i) + way(j) <= apart)) return false;
-    }
+    bool all_apart = true;
+    b.outer_owned.for_each([&](std::int32_t own, std::int32_t first, std::int32_t end) {
+      if (!all_apart) return;
+      for (auto m = static_cast<std::size_t>(first); m < static_cast<std::size_t>(end); ++m) {
+        if (b.listed[m / 64] >> (m % 64) & 1) continue;
+        const auto i = static_cast<std::size_t>(b.first + own), j = static_cast<std::size_t>(b.outer_j[m]);
+        if (!beyond[i] && !beyond[j]) continue;
+        const double dx = domain_.nearest_x(before(i, 0) - before(j, 0)), dy = domain_.nearest_y(before(i, 1) - before(j, 1));
+        const double apart = std::hypot(dx, dy, before(i, 2) - before(j, 2)) - particles_.radius_of(b.first + own) - particles_.radius_of(b.outer_j[m]);
+        all_apart = all_apart && way(i) + way(j) <= apart;
+      }
+    });
+    if (!all_apart) return false;
   }
   return true;
 }
@@ -378,9 +383,11 @@ void Simulation::prune_lists() {
   merge_all();
   const auto plates = plate_history(batches_, particles_);
   const ParallelFor run = on_workers();
+  for (Saved::OfBatch& of : saved_->batches) of.history.release();  // nobody goes back behind a prune: lists come to lie where there is most room
   prune(batches_, particles_, domain_, inner_, keeps_k_t(), kernels_, run);
   list_plates(batches_, particles_, planes_, step_, inner_, plate_gap_, plates, run);
   start_from_here();
+  listed_ = true;
   ++counters_.prunes;
 }
 
@@ -441,7 +448,7 @@ void Simulation::rebuild_from(const PairHistories& pairs, const std::vector<Plat
   prepare_graph();
   start_from_here();
   lists_valid_ = true;
-  rebuilt_ = true;
+  listed_ = true;
   ++counters_.rebuilds;
   counters_.batches = static_cast<int>(batches_.size());
 }
@@ -470,11 +477,12 @@ void Simulation::open_sides() {
   kept.by_place = all.by_place;
   kept.start.assign(1, 0);
   std::vector<PairHistory> left;
+  const std::vector<std::int32_t> places = particles_.places();
   for (std::size_t bucket = 0; bucket + 1 < all.start.size(); ++bucket) {
     for (std::int32_t k = all.start[bucket]; k < all.start[bucket + 1]; ++k) {
       const PairHistory& h = all.pairs[static_cast<std::size_t>(k)];
-      const auto a = static_cast<std::size_t>(particles_.place[static_cast<std::size_t>(h.low)]);
-      const auto b = static_cast<std::size_t>(particles_.place[static_cast<std::size_t>(h.high)]);
+      const auto a = static_cast<std::size_t>(places[static_cast<std::size_t>(h.low)]);
+      const auto b = static_cast<std::size_t>(places[static_cast<std::size_t>(h.high)]);
       const double dx = particles_.x[a] - particles_.x[b], dy = particles_.y[a] - particles_.y[b];
       if (domain_.nearest_x(dx) == dx && domain_.nearest_y(dy) == dy) left.push_back(h);
     }
@@ -493,15 +501,14 @@ void Simulation::make_room_to_save() {
   Saved& s = *saved_;
   if (!moves_in_rows_)
     for (auto* column : {&s.x, &s.y, &s.z, &s.vx, &s.vy, &s.vz, &s.ux, &s.uy, &s.uz}) column->resize_to_overwrite(particles_.x.size());
-  s.image.resize_to_overwrite(particles_.image.size());
   s.batches.resize(batches_.size());
   parallel(static_cast<int>(batches_.size()), [&](int k) {
     for_each_history(batches_[static_cast<std::size_t>(k)], [&](std::size_t size) { s.batches[static_cast<std::size_t>(k)].history.resize_to_overwrite(size); },
                      [](double*, std::size_t, std::size_t) {});
   });
-  // What a rebuild has taken besides lies there unused for hundreds of steps.
-  if (rebuilt_ && moves_in_rows_) trim_pool();
-  rebuilt_ = false;
+  // What making lists has taken besides lies there unused for tens to hundreds of steps.
+  if (listed_ && moves_in_rows_) trim_pool();
+  listed_ = false;
 }
 
 namespace {
@@ -513,9 +520,9 @@ void copy_part(const Batch& b, const AlignedArray<double>& from, AlignedArray<do
 
 void Simulation::save_positions(const Batch& b) {
   Saved& s = *saved_;
-  const Particles& p = particles_;
+  Particles& p = particles_;
   if (!moves_in_rows_) copy_part(b, p.x, s.x), copy_part(b, p.y, s.y), copy_part(b, p.z, s.z);
-  std::copy_n(p.image.data() + 2 * b.first, 2 * b.count, s.image.data() + 2 * b.first);
+  p.keep_crossings(b.first, b.count);
 }
 
 void Simulation::save_velocities(const Batch& b) {
@@ -535,7 +542,7 @@ void Simulation::save_velocities(const Batch& b) {
 
 void Simulation::save_history(Batch& b) {
   Saved::OfBatch& to = saved_->batches[static_cast<std::size_t>(&b - batches_.data())];
-  for_each_history(b, [](std::size_t) {}, [&](double* data, std::size_t size, std::size_t at) { std::copy_n(data, size, to.history.data() + at); });
+  for_each_history(b, [](std::size_t) {}, [&](double* data, std::size_t size, std::size_t at) { to.history.put(at, data, size); });
   to.contacts = b.pair_totals.contacts;
 }
 
@@ -547,13 +554,13 @@ void Simulation::restore() {
     p.vx.swap(s.vx), p.vy.swap(s.vy), p.vz.swap(s.vz);
     p.ux.swap(s.ux), p.uy.swap(s.uy), p.uz.swap(s.uz);
   }
-  p.image.swap(s.image);
+  std::fill(p.crossed.begin(), p.crossed.end(), std::int8_t{0});
   p.write_rows(on_workers());
   for (std::size_t k = 0; k < batches_.size(); ++k) {
     Batch& b = batches_[k];
     const Saved::OfBatch& from = s.batches[k];
     for_each_history(b, [](std::size_t) {},
-                     [&](double* data, std::size_t size, std::size_t at) { std::copy_n(from.history.data() + at, size, data); });
+                     [&](double* data, std::size_t size, std::size_t at) { from.history.get(at, data, size); });
     std::fill(b.sum.begin(), b.sum.end(), 0.0);
     merged_[k] = 1;
     b.pair_totals = {};

@@ -55,7 +55,7 @@ struct PairSums {
 
 void add_pairs(const Batch& b, const Particles& p, const Domain& domain, const LawConstants& c, PairSums& sums) {
   for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k) {
-    const PairState s = pair_state(p, domain, b.i[k], b.j(k));
+    const PairState s = pair_state(p, domain, b.i(k), b.j(k));
     if (!(s.delta > 0.0)) continue;
     sums.deepest = std::max(sums.deepest, s.delta / (2.0 * std::min(s.R_i, s.R_j)));
     sums.elastic.add(normal_energy(c, s.delta, b.sp[k]));
@@ -102,7 +102,7 @@ double Simulation::stress(int plate) {
 
 double Simulation::mean_radius() const {
   double sum = 0.0;
-  for (const std::int32_t place : particles_.place) sum += particles_.radius_of(place);
+  for (const std::int32_t place : particles_.places()) sum += particles_.radius_of(place);
   return particles_.count > 0 ? sum / particles_.count : 0.0;
 }
 
@@ -240,14 +240,15 @@ Snapshot Simulation::snapshot(bool with_contacts) {
   const Particles& p = particles_;
   const auto n = static_cast<std::size_t>(p.count);
   ParticleFields& f = out.particles;
-  f.id = p.id_of_rank;
+  const std::vector<std::int32_t> places = p.places();
+  f.id = p.id_of_rank.all();
   f.position.resize(3 * n), f.velocity.resize(3 * n), f.angular_velocity.resize(3 * n), f.image.resize(2 * n);
   f.radius.resize(n), f.mass.resize(n);
   const double half = 0.5 * last_drift_;
   double highest = 0.0;
   for (std::size_t rank = 0; rank < n; ++rank) {
-    const auto k = static_cast<std::size_t>(p.place[rank]);
-    const double R = p.radius_of(p.place[rank]), m = p.mass_of(p.place[rank]);
+    const auto k = static_cast<std::size_t>(places[rank]);
+    const double R = p.radius_of(places[rank]), m = p.mass_of(places[rank]);
     const double* s = &sums[record_size * rank];
     f.radius[rank] = R, f.mass[rank] = m;
     const double x[3] = {p.x[k], p.y[k], p.z[k]}, v[3] = {p.vx[k], p.vy[k], p.vz[k]}, u[3] = {p.ux[k], p.uy[k], p.uz[k]};
@@ -261,7 +262,7 @@ Snapshot Simulation::snapshot(bool with_contacts) {
     const double loss = half * 2.5 * (motion_.mu_r * s[3] + s[7]) / m, size = std::sqrt(size2);
     const double left = loss < size ? (size - loss) / size : 0.0;
     for (std::size_t axis = 0; axis < 3; ++axis) f.angular_velocity[3 * rank + axis] = left * spin[axis] / R;
-    f.image[2 * rank] = p.image[2 * k], f.image[2 * rank + 1] = p.image[2 * k + 1];
+    f.image[2 * rank] = p.boxes(k, 0), f.image[2 * rank + 1] = p.boxes(k, 1);
     highest = rank == 0 ? p.z[k] + R : std::max(highest, p.z[k] + R);
   }
   out.z_bottom = plane(plate_bottom).present ? plane_position(plate_bottom) : 0.0;
@@ -276,16 +277,16 @@ Snapshot Simulation::snapshot(bool with_contacts) {
   std::vector<Row> rows;
   for (const Batch& b : batches_)
     for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k) {
-      const std::int32_t ri = p.rank[static_cast<std::size_t>(b.i[k])], rj = p.rank[static_cast<std::size_t>(b.j(k))];
-      if (pair_state(p, domain_, b.i[k], b.j(k)).delta > 0.0) rows.push_back({std::min(ri, rj), std::max(ri, rj), &b, k});
+      const std::int32_t ri = p.rank[static_cast<std::size_t>(b.i(k))], rj = p.rank[static_cast<std::size_t>(b.j(k))];
+      if (pair_state(p, domain_, b.i(k), b.j(k)).delta > 0.0) rows.push_back({std::min(ri, rj), std::max(ri, rj), &b, k});
     }
   std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.low != b.low ? a.low < b.low : a.high < b.high; });
   ContactFields& c = out.contacts;
   for (const Row& row : rows) {
     const Batch& b = *row.batch;
     const std::size_t k = row.k;
-    const bool straight = p.rank[static_cast<std::size_t>(b.i[k])] == row.low;
-    const std::int32_t low = straight ? b.i[k] : b.j(k), high = straight ? b.j(k) : b.i[k];
+    const bool straight = p.rank[static_cast<std::size_t>(b.i(k))] == row.low;
+    const std::int32_t low = straight ? b.i(k) : b.j(k), high = straight ? b.j(k) : b.i(k);
     const double sign = straight ? 1.0 : -1.0;
     const PairState s = pair_state(p, domain_, low, high);
     const auto a = static_cast<std::size_t>(low), d = static_cast<std::size_t>(high);
@@ -347,10 +348,11 @@ std::uint64_t Simulation::state_hash(const std::string& extra) {
     put(&x, sizeof x);
   };
   const Particles& p = particles_;
-  for (const std::int32_t place : p.place) {
+  for (const std::int32_t place : p.places()) {
     const auto k = static_cast<std::size_t>(place);
     for (const auto* column : {&p.x, &p.y, &p.z, &p.vx, &p.vy, &p.vz, &p.ux, &p.uy, &p.uz}) number((*column)[k]);
-    put(p.image.data() + 2 * k, 2 * sizeof(std::int32_t));
+    const std::int32_t boxes[2] = {p.boxes(k, 0), p.boxes(k, 1)};
+    put(boxes, sizeof boxes);
   }
   std::vector<PairHistory> pairs = pair_history(batches_, particles_).pairs.in_a_row();
   std::sort(pairs.begin(), pairs.end(),
@@ -375,15 +377,15 @@ std::uint64_t Simulation::state_hash(const std::string& extra) {
 StepLimits Simulation::limits_of_network(std::string* ruled_by) {
   const FloatMode mode;
   ensure_forces();
-  std::vector<NetworkBody> bodies(static_cast<std::size_t>(particles_.count));
-  for (std::size_t rank = 0; rank < bodies.size(); ++rank)
-    bodies[rank] = {particles_.mass_of(particles_.place[rank]), particles_.radius_of(particles_.place[rank])};
+  std::vector<NetworkBody> bodies;
+  bodies.reserve(static_cast<std::size_t>(particles_.count));
+  for (const std::int32_t place : particles_.places()) bodies.push_back({particles_.mass_of(place), particles_.radius_of(place)});
   std::vector<StiffContact> contacts;
   std::vector<int> plates;  // of the contacts behind those of pairs
   for (const Batch& b : batches_)
     for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k) {
-      const std::int32_t ri = particles_.rank[static_cast<std::size_t>(b.i[k])], rj = particles_.rank[static_cast<std::size_t>(b.j(k))];
-      const PairState s = ri < rj ? pair_state(particles_, domain_, b.i[k], b.j(k)) : pair_state(particles_, domain_, b.j(k), b.i[k]);
+      const std::int32_t ri = particles_.rank[static_cast<std::size_t>(b.i(k))], rj = particles_.rank[static_cast<std::size_t>(b.j(k))];
+      const PairState s = ri < rj ? pair_state(particles_, domain_, b.i(k), b.j(k)) : pair_state(particles_, domain_, b.j(k), b.i(k));
       if (!(s.delta > 0.0)) continue;
       const double K1 = loading_slope(law_, s.delta);
       const double beta = std::sqrt(law_.damping * s.m_eff * K1);
@@ -448,7 +450,7 @@ void Simulation::fail(const std::string& what) {
   double severity = 0.5;
   for (const Batch& b : batches_)
     for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k) {
-      const PairState s = pair_state(particles_, domain_, b.i[k], b.j(k));
+      const PairState s = pair_state(particles_, domain_, b.i(k), b.j(k));
       if (!(s.delta > 0.0)) continue;
       const double normal = law_.f0 + law_.k2 * (overlap_power(law_, s.delta) - b.sp[k]);
       const double spring = std::sqrt(b.tx[k] * b.tx[k] + b.ty[k] * b.ty[k] + b.tz[k] * b.tz[k]);
@@ -458,14 +460,14 @@ void Simulation::fail(const std::string& what) {
     }
   if (worst_batch != nullptr) {
     const Batch& b = *worst_batch;
-    const PairState s = pair_state(particles_, domain_, b.i[worst], b.j(worst));
-    const auto i = static_cast<std::size_t>(b.i[worst]), j = static_cast<std::size_t>(b.j(worst));
+    const PairState s = pair_state(particles_, domain_, b.i(worst), b.j(worst));
+    const auto i = static_cast<std::size_t>(b.i(worst)), j = static_cast<std::size_t>(b.j(worst));
     const double R = std::min(s.R_i, s.R_j);
     const double approach = (particles_.vx[j] - particles_.vx[i]) * s.n[0] + (particles_.vy[j] - particles_.vy[i]) * s.n[1] +
                             (particles_.vz[j] - particles_.vz[i]) * s.n[2];
     std::snprintf(line, sizeof line,
                   "; spheres %lld at (%g, %g, %g) m and %lld at (%g, %g, %g) m overlap by %.2f R (plastic %.2f R), approach at %g m/s, push with %g N, rub with %g N",
-                  id(b.i[worst]), particles_.x[i], particles_.y[i], particles_.z[i], id(b.j(worst)), particles_.x[j], particles_.y[j], particles_.z[j],
+                  id(b.i(worst)), particles_.x[i], particles_.y[i], particles_.z[i], id(b.j(worst)), particles_.x[j], particles_.y[j], particles_.z[j],
                   s.delta / R, overlap_root(law_, b.sp[worst]) / R, approach, law_.f0 + law_.k2 * (overlap_power(law_, s.delta) - b.sp[worst]),
                   std::sqrt(b.tx[worst] * b.tx[worst] + b.ty[worst] * b.ty[worst] + b.tz[worst] * b.tz[worst]));
     text += line;

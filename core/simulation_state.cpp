@@ -19,14 +19,14 @@ SimulationState Simulation::whole_state() {
   keep_sums(sums);
   SimulationState s;
   const Particles& p = particles_;
-  s.id = p.id_of_rank;
-  for (const std::int32_t place : p.place) {
+  s.id = p.id_of_rank.all();
+  for (const std::int32_t place : p.places()) {
     const auto k = static_cast<std::size_t>(place);
     s.radius.push_back(p.radius_of(place));
     s.position.insert(s.position.end(), {p.x[k], p.y[k], p.z[k]});
     s.velocity.insert(s.velocity.end(), {p.vx[k], p.vy[k], p.vz[k]});
     s.turning.insert(s.turning.end(), {p.ux[k], p.uy[k], p.uz[k]});
-    s.image.insert(s.image.end(), {p.image[2 * k], p.image[2 * k + 1]});
+    s.image.insert(s.image.end(), {p.boxes(k, 0), p.boxes(k, 1)});
   }
   s.sums = sums.in_a_row();
   s.pairs = pair_history(batches_, p).pairs.in_a_row();
@@ -49,7 +49,7 @@ void Simulation::take_up(const SimulationState& s) {
   const FloatMode mode;
   Particles& p = particles_;
   const auto n = static_cast<std::size_t>(p.count);
-  if (s.id != p.id_of_rank || s.radius.size() != n || s.position.size() != 3 * n || s.velocity.size() != 3 * n || s.turning.size() != 3 * n ||
+  if (s.id != p.id_of_rank.all() || s.radius.size() != n || s.position.size() != 3 * n || s.velocity.size() != 3 * n || s.turning.size() != 3 * n ||
       s.image.size() != 2 * n || s.sums.size() != record_size * n)
     throw std::invalid_argument("the state is that of other spheres");
   const auto is_rank = [&](std::int32_t r) { return r >= 0 && r < p.count; };
@@ -57,12 +57,14 @@ void Simulation::take_up(const SimulationState& s) {
     if (!is_rank(h.low) || !is_rank(h.high)) throw std::invalid_argument("the state has contacts of spheres that are not there");
   for (const PlateHistory& h : s.plates)
     if (!is_rank(h.rank) || h.plate < 0 || h.plate >= plate_count) throw std::invalid_argument("the state has contacts of spheres that are not there");
+  const std::vector<std::int32_t> places = p.places();
   for (std::size_t rank = 0; rank < n; ++rank) {
-    const auto k = static_cast<std::size_t>(p.place[rank]);
+    const auto k = static_cast<std::size_t>(places[rank]);
     p.x[k] = s.position[3 * rank], p.y[k] = s.position[3 * rank + 1], p.z[k] = s.position[3 * rank + 2];
     p.vx[k] = s.velocity[3 * rank], p.vy[k] = s.velocity[3 * rank + 1], p.vz[k] = s.velocity[3 * rank + 2];
     p.ux[k] = s.turning[3 * rank], p.uy[k] = s.turning[3 * rank + 1], p.uz[k] = s.turning[3 * rank + 2];
     p.image[2 * k] = s.image[2 * rank], p.image[2 * k + 1] = s.image[2 * rank + 1];
+    p.crossed[2 * k] = p.crossed[2 * k + 1] = 0;
   }
   p.write_rows();
   planes_ = s.planes;

@@ -65,9 +65,8 @@ TaskTable::TaskTable(const std::vector<Batch>& batches, int steps, bool fused) :
   const auto resources = static_cast<std::size_t>(count) * resource_count;
   std::vector<std::int32_t> writer(resources, -1);
   std::vector<std::vector<std::int32_t>> readers(resources);
-  successors_.resize(tasks_.size());
   predecessors_.assign(tasks_.size(), 0);
-  std::vector<std::int32_t> before;
+  std::vector<std::int32_t> before, all_before;
   for (std::size_t t = 0; t < tasks_.size(); ++t) {
     const auto list = accesses(tasks_[t]);
     before.clear();
@@ -81,7 +80,7 @@ TaskTable::TaskTable(const std::vector<Batch>& batches, int steps, bool fused) :
     before.erase(std::unique(before.begin(), before.end()), before.end());
     for (std::int32_t p : before) {
       if (p == static_cast<std::int32_t>(t)) continue;
-      successors_[static_cast<std::size_t>(p)].push_back(static_cast<std::int32_t>(t));
+      all_before.push_back(p);
       ++predecessors_[t];
     }
     for (const Access& access : list) {
@@ -95,6 +94,7 @@ TaskTable::TaskTable(const std::vector<Batch>& batches, int steps, bool fused) :
       if (!access.writes && writer[static_cast<std::size_t>(access.resource)] != static_cast<std::int32_t>(t))
         readers[static_cast<std::size_t>(access.resource)].push_back(static_cast<std::int32_t>(t));
   }
+  successors_ = TaskSuccessors(all_before, predecessors_);
 }
 
 void TaskTable::reorder(const TaskOrder& order) {
@@ -102,14 +102,14 @@ void TaskTable::reorder(const TaskOrder& order) {
   std::vector<std::int32_t> place(count);
   for (std::size_t k = 0; k < count; ++k) place[static_cast<std::size_t>(order.tasks[k])] = static_cast<std::int32_t>(k);
   std::vector<Task> tasks;
-  std::vector<std::vector<std::int32_t>> successors;
+  TaskSuccessors successors;
   std::vector<std::int32_t> predecessors;
+  tasks.reserve(count), predecessors.reserve(count), successors.reserve(count, successors_.edges());
   for (const std::int32_t t : order.tasks) {
     const auto k = static_cast<std::size_t>(t);
     tasks.push_back(tasks_[k]), predecessors.push_back(predecessors_[k]);
     tasks.back().number = place[k];
-    successors.push_back(std::move(successors_[k]));
-    for (std::int32_t& next : successors.back()) next = place[static_cast<std::size_t>(next)];
+    successors.add(successors_[k], [&](std::int32_t next) { return place[static_cast<std::size_t>(next)]; });
   }
   tasks_ = std::move(tasks), successors_ = std::move(successors), predecessors_ = std::move(predecessors);
   ordered_ = true;
@@ -129,11 +129,7 @@ std::vector<int> worker_of_batches(const TaskTable& table, std::size_t batches) 
 }
 
 void TaskTable::remove_edge(std::int32_t from, std::int32_t to) {
-  auto& list = successors_[static_cast<std::size_t>(from)];
-  const auto it = std::find(list.begin(), list.end(), to);
-  if (it == list.end()) return;
-  list.erase(it);
-  --predecessors_[static_cast<std::size_t>(to)];
+  if (successors_.remove(from, to)) --predecessors_[static_cast<std::size_t>(to)];
 }
 
 std::string TaskTable::to_dot() const {

@@ -14,12 +14,13 @@
 #include <vector>
 
 #include "core/batches.h"
+#include "core/task_successors.h"
 
 namespace platen {
 
 enum class TaskKind : std::uint8_t {
   integrate,  // reads sums of b, halo slots meant for b, plate forces of b; writes x v u of b and its largest speed. Of a run's first step it
-              // saves x v u, and contacts the history, in places of b alone
+              // saves x v u and which sides were crossed before, and contacts the history, in places of b alone
   contacts,   // reads x v u of b and its partners; writes history, sums and halo slots of b
   step        // fused: integrate, then contacts
 };
@@ -53,7 +54,7 @@ class TaskTable {
   int steps() const { return steps_; }
   bool fused() const { return fused_; }
   const std::vector<Task>& tasks() const { return tasks_; }
-  const std::vector<std::vector<std::int32_t>>& successors() const { return successors_; }
+  const TaskSuccessors& successors() const { return successors_; }
   const std::vector<std::int32_t>& predecessors() const { return predecessors_; }  // their number
   // Whether the order of the tasks is meant [core/task_order.h]; otherwise a graph takes whichever is ready.
   bool ordered() const { return ordered_; }
@@ -70,7 +71,7 @@ class TaskTable {
   bool fused_, ordered_ = false;
   std::vector<std::vector<int>> partners_, owners_;  // of each batch
   std::vector<Task> tasks_;
-  std::vector<std::vector<std::int32_t>> successors_;
+  TaskSuccessors successors_;
   std::vector<std::int32_t> predecessors_, worker_;
 };
 

@@ -10,7 +10,7 @@ namespace {
 
 // Asking costs time too: no task asks for more than so much with each of its contacts [bytes] ...
 constexpr double asked_with_a_contact = 96.0;
-// ... nor for less than this at a time, and nobody for what is needed so many tasks with contacts later.
+// ... nor for less than this at a time, and nobody for what is needed so many tasks with contacts later, or is used before that.
 constexpr double least_asked = 4096.0;
 constexpr std::size_t longest_ahead = 8;
 
@@ -25,6 +25,8 @@ TaskAsks asks_of_tasks(const TaskTable& table, const std::vector<Batch>& batches
   const std::vector<int> worker = worker_of_batches(table, batches.size());
   CacheModel caches(batches, worker, bytes);
   TaskAsks asks(table.tasks().size());
+  std::vector<std::int64_t> last_use[2];  // of each batch's state and of its contacts: the task
+  for (auto& of : last_use) of.assign(batches.size(), -1);
   std::vector<std::vector<Host>> hosts(worker.empty() ? 0 : 1 + static_cast<std::size_t>(*std::max_element(worker.begin(), worker.end())));
   for (std::size_t t = 0; t < table.tasks().size(); ++t) {
     const Task& task = table.tasks()[t];
@@ -35,6 +37,7 @@ TaskAsks asks_of_tasks(const TaskTable& table, const std::vector<Batch>& batches
       double left = missing;
       for (std::size_t n = 0; n < std::min(before.size(), longest_ahead) && left > 0.0; ++n) {
         Host& host = before[before.size() - 1 - n];
+        if (static_cast<std::int64_t>(host.task) <= last_use[contacts][batch]) break;
         const double part = std::min(host.room, left);
         if (part < std::min(least_asked, missing) || asks[host.task].size() == most_asked) continue;
         host.room -= part;
@@ -46,6 +49,8 @@ TaskAsks asks_of_tasks(const TaskTable& table, const std::vector<Batch>& batches
     caches.use(task);
     if (missing.state > 0.0) deal_out(missing.state, false);
     if (missing.contacts > 0.0) deal_out(missing.contacts, true);
+    last_use[false][batch] = static_cast<std::int64_t>(t);
+    if (task.kind != TaskKind::integrate) last_use[true][batch] = static_cast<std::int64_t>(t);
     if (task.kind != TaskKind::integrate) before.push_back({t, asked_with_a_contact * batches[batch].padded});
   }
   return asks;

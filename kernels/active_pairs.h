@@ -62,7 +62,7 @@ class GatheredPairs {
         const int at = active.at[m] + __builtin_ctz(lanes);
         const std::int32_t k = start + at;
         chunk.move(n, at);
-        from_[n] = k, i_[n] = b.i[k], row_j_[n] = b.row_j[k], to_[n].partner = b.to[k].partner;
+        from_[n] = k, i_[n] = b.first + owner_of(b.to[k]), row_j_[n] = b.row_j[k], to_[n].partner = b.to[k].partner;
         tx_[n] = b.tx[k], ty_[n] = b.ty[k], tz_[n] = b.tz[k];
         if constexpr (scene.plasticity) sp_[n] = b.sp[k];
         if constexpr (scene.exponent != Exponent::one) k_t_last_[n] = b.k_t_last[k];
@@ -83,7 +83,7 @@ class GatheredPairs {
 
   PairBatch view(const PairBatch& b) {
     PairBatch v = b;
-    v.i = i_, v.row_j = row_j_, v.to = to_, v.owners = owners_;
+    v.row_j = row_j_, v.to = to_, v.owners = owners_;
     v.tx = tx_, v.ty = ty_, v.tz = tz_, v.sp = sp_, v.k_t_last = k_t_last_;
     return v;
   }

@@ -17,8 +17,9 @@ struct AskedFor {
 };
 // The first chunk asks for all between as well. Rows are those of any batch, records of this one alone.
 PLATEN_INLINE AskedFor asked_for(const PairBatch& b, std::int32_t start) {
-  const std::int32_t next = start + chunk_size < b.count ? b.i[start + chunk_size] : b.end, last = next + b.ahead;
-  return {start > 0 ? b.i[start] + b.ahead : b.i[start], last < b.spheres ? last : b.spheres, last < b.end ? last : b.end};
+  const auto owner = [&](std::int32_t k) __attribute__((always_inline)) { return b.first + owner_of(b.to[k]); };
+  const std::int32_t next = start + chunk_size < b.count ? owner(start + chunk_size) : b.end, last = next + b.ahead;
+  return {start > 0 ? owner(start) + b.ahead : owner(start), last < b.spheres ? last : b.spheres, last < b.end ? last : b.end};
 }
 
 // With `asks_history` also for the history of contacts some chunks ahead; that of the first and the last few comes unasked.

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "kernels/chunk.h"
+#include "kernels/owner_runs.h"
 #include "kernels/rows.h"
 
 namespace platen {
@@ -24,7 +25,10 @@ PLATEN_INLINE void fetch_owners(const PairBatch& b, int first_part, std::int32_t
       return;
     }
   }
-  for (int part = 0; part < parts; ++part) f[part] = fetch_part<I, row_size>(b.rows, first_part + part, b.i + k);
+  std::int32_t owners[I::width];  // no list names them: it would be one more to follow
+  for (int lane = 0; lane < I::width; ++lane) owners[lane] = owner_of(b.to[k + lane]);
+  const double* const rows = b.rows + row_size * static_cast<std::int64_t>(b.first);
+  for (int part = 0; part < parts; ++part) f[part] = fetch_part<I, row_size>(rows, first_part + part, owners);
 }
 
 // Distance, normal and overlap of `width` pairs from `k` on.

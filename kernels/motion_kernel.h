@@ -98,7 +98,7 @@ void motion_kernel(const MotionBatch& b, const MotionConstants& c, MotionTotals&
       double shift[I::width];
       I::store(shift, I::where(below, I::set(-1.0), I::where(above, I::set(1.0), zero)));
       for (int lane = 0; lane < I::width; ++lane)
-        b.image[2 * (k + lane) + axis] += static_cast<std::int32_t>(shift[lane]);
+        b.crossed[2 * (k + lane) + axis] = static_cast<std::int8_t>(b.crossed[2 * (k + lane) + axis] + static_cast<int>(shift[lane]));
       coordinate = I::where(below, coordinate + L, I::where(above, coordinate - L, coordinate));
     };
     if (c.width > 0.0) wrap(x.x, c.width, 0), wrap(x.y, c.depth, 1);

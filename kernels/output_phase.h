@@ -39,7 +39,7 @@ PLATEN_INLINE void output_pairs(const Chunk<scene>& chunk, int at, const PairBat
 // What is carried to contact k where it does not follow the one before: all that its owner has got.
 template <class I>
 PLATEN_INLINE typename I::Record taken_up(const PairBatch& b, std::int32_t k) {
-  return I::load_sum(b.sum + record_size * static_cast<std::int64_t>(b.i[k] - b.first));
+  return I::load_sum(record_at(b.sum, own_of(b.to[k])));
 }
 
 }  // namespace platen

@@ -1,4 +1,4 @@
-// Where each owner's sum is, and where its contacts begin in a list [kernels/views.h, PairTargets].
+// Whose each contact is, where that owner's sum is, and where its contacts begin in a list [kernels/views.h, PairTargets].
 #pragma once
 
 #include "kernels/real.h"
@@ -8,6 +8,8 @@ namespace platen {
 
 PLATEN_INLINE std::uint32_t own_of(const PairTargets& to) { return to.own_and_again >> 8; }
 PLATEN_INLINE std::uint8_t again_of(const PairTargets& to) { return static_cast<std::uint8_t>(to.own_and_again); }
+// The owner itself, counted from the batch's first particle.
+PLATEN_INLINE std::int32_t owner_of(const PairTargets& to) { return static_cast<std::int32_t>(to.own_and_again >> 14); }
 
 // Puts that into the targets of `count` contacts, owned by i, ascending. `first`: the batch's first particle, less than
 // most_spheres_of_batch before any of them.

@@ -62,10 +62,10 @@ struct LawConstants {
   double dt;                 // last drift; 0 when forces are evaluated without advancing springs
 };
 
-// The contacts that a batch owns. Sorted by i, then j; `count` is a multiple of `pair_padding`, padded with i = j.
+// The contacts that a batch owns. Sorted by owner, then j; `count` is a multiple of `pair_padding`, padded with i = j.
 //
 //   contact:      0      1      2      3     4   ...
-//   i             17     17     17     18    20  ...   owner side: particle of this batch
+//   owner i       17     17     17     18    20  ...   particle of this batch, in no list of its own: owner_of(to)
 //   row_j         216    300    10836  300   252 ...   row of the partner j, any particle: 12 j, in doubles from `rows`
 //   to.partner    64     512    32768  512   256 ...   where j's share goes, in bytes from `sum`: an own particle, or a halo slot
 //   own_of(to)    0      0      0      64    192 ...   where the owner's sum is, in the same bytes
@@ -95,7 +95,7 @@ struct AskedLines {
 
 struct PairBatch {
   const double* rows;
-  const std::int32_t *i, *row_j;
+  const std::int32_t* row_j;
   const PairTargets* to;
   const OwnersOfEight* owners;  // of each eight contacts
   double *sp, *tx, *ty, *tz;
@@ -240,7 +240,7 @@ struct MotionBatch {
   double *x, *y, *z, *vx, *vy, *vz, *ux, *uy, *uz;               // null where rows alone hold the state
   const double *inverse_mass, *mass, *radius, *inverse_radius;  // null where spheres are equal
   double* rows;            // of this batch's first particle
-  std::int32_t* image;     // 2 per particle
+  std::int8_t* crossed;    // 2 per particle: box lengths left behind, to which those of this step are added
   double* sum;             // records: the forces
   bool clears;             // sets them to zero
   float* speed2;           // of each particle: |v - mean|^2 is added [m2/s2]

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <vector>
 
 namespace platen {
 
@@ -13,27 +14,29 @@ namespace {
 
 // The sphere that is not anywhere or farthest out.
 std::string farthest_sphere(const Particles& p) {
-  const std::int32_t* found = nullptr;
+  const std::vector<std::int32_t> places = p.places();
+  std::size_t found = places.size();
   double most = -1.0;
-  for (const std::int32_t& place : p.place) {
-    const auto k = static_cast<std::size_t>(place);
+  for (std::size_t rank = 0; rank < places.size(); ++rank) {
+    const auto k = static_cast<std::size_t>(places[rank]);
     const double sum = std::fabs(p.x[k]) + std::fabs(p.y[k]) + std::fabs(p.z[k]);
     const double all = sum + p.vx[k] + p.vy[k] + p.vz[k] + p.ux[k] + p.uy[k] + p.uz[k];
     const double far = std::isfinite(all) ? sum : std::numeric_limits<double>::infinity();
-    if (far > most) most = far, found = &place;
+    if (far > most) most = far, found = rank;
   }
-  if (!found) return "";
-  const auto k = static_cast<std::size_t>(*found);
-  return fmt::format("; sphere {} at ({:g}, {:g}, {:g}) m moves at ({:g}, {:g}, {:g}) m/s", p.id_of_rank[static_cast<std::size_t>(found - p.place.data())],
+  if (found == places.size()) return "";
+  const auto k = static_cast<std::size_t>(places[found]);
+  return fmt::format("; sphere {} at ({:g}, {:g}, {:g}) m moves at ({:g}, {:g}, {:g}) m/s", p.id_of_rank[found],
                      p.x[k], p.y[k], p.z[k], p.vx[k], p.vy[k], p.vz[k]);
 }
 
 std::string fastest_turning_sphere(const Particles& p) {
   std::string text;
   double most = -1.0;
-  for (std::size_t rank = 0; rank < p.place.size(); ++rank) {
-    const auto k = static_cast<std::size_t>(p.place[rank]);
-    const double spin = std::sqrt(p.ux[k] * p.ux[k] + p.uy[k] * p.uy[k] + p.uz[k] * p.uz[k]) / p.radius_of(p.place[rank]);
+  const std::vector<std::int32_t> places = p.places();
+  for (std::size_t rank = 0; rank < places.size(); ++rank) {
+    const auto k = static_cast<std::size_t>(places[rank]);
+    const double spin = std::sqrt(p.ux[k] * p.ux[k] + p.uy[k] * p.uy[k] + p.uz[k] * p.uz[k]) / p.radius_of(places[rank]);
     if (spin > most) most = spin, text = fmt::format("; sphere {} at ({:g}, {:g}, {:g}) m turns at {:g} rad/s", p.id_of_rank[rank], p.x[k], p.y[k], p.z[k], spin);
   }
   return text;

@@ -26,12 +26,13 @@ constexpr double leap = 2e-6;  // [m]
 // A chunk of pairs that are apart, with their geometry and what is remembered numbered by pair.
 struct Sample {
   Chunk<scene> chunk{};
-  std::vector<std::int32_t> i, row_j;
+  std::vector<std::int32_t> row_j;
   std::vector<PairTargets> to;
   std::vector<double> sp, tx, ty, tz, k_t_last;
   PairBatch batch{};
 
-  Sample() : i(chunk_size), row_j(chunk_size), to(chunk_size), sp(chunk_size), tx(chunk_size), ty(chunk_size), tz(chunk_size), k_t_last(chunk_size) {
+  Sample() : row_j(chunk_size), to(chunk_size), sp(chunk_size), tx(chunk_size), ty(chunk_size), tz(chunk_size), k_t_last(chunk_size) {
+    std::int32_t i[chunk_size];
     for (int k = 0; k < chunk_size; ++k) {
       const auto at = static_cast<std::size_t>(k);
       i[at] = 100 + k / 3, row_j[at] = row_size * (1000 + k), to[at].partner = record_bytes * (500 + k);
@@ -39,7 +40,8 @@ struct Sample {
       for (int axis = 0; axis < 3; ++axis) chunk.n[axis][k] = 10 * k + axis;
       for (int side = 0; side < 2; ++side) chunk.R[side][k] = 2 + k + 0.1 * side;
     }
-    batch.i = i.data(), batch.row_j = row_j.data(), batch.to = to.data();
+    find_owner_runs(i, chunk_size, 100, to.data());
+    batch.row_j = row_j.data(), batch.to = to.data();
     batch.sp = sp.data(), batch.tx = tx.data(), batch.ty = ty.data(), batch.tz = tz.data(), batch.k_t_last = k_t_last.data();
     batch.first = 100, batch.end = 900, batch.count = chunk_size, batch.nothing = record_bytes * 900, batch.leap = leap;
   }
@@ -98,7 +100,7 @@ TEST(ActivePairs, AreGatheredWhereFew) {
     EXPECT_EQ(s.chunk.inverse[n], before.inverse[k]);
     for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(s.chunk.n[axis][n], before.n[axis][k]);
     for (int side = 0; side < 2; ++side) EXPECT_EQ(s.chunk.R[side][n], before.R[side][k]);
-    EXPECT_EQ(view.i[n], 100 + k / 3);
+    EXPECT_EQ(owner_of(view.to[n]), k / 3);
     EXPECT_EQ(view.row_j[n], row_size * (1000 + k));
     EXPECT_EQ(view.to[n].partner, record_bytes * (500 + k));
     EXPECT_EQ(view.sp[n], k + 0.5);
@@ -122,9 +124,9 @@ TEST(ActivePairs, AreFilledUpWithPairsThatAreApart) {
   const PairBatch view = gathered.view(s.batch);
   ASSERT_EQ(active.count, 2);
   EXPECT_LT(s.chunk.delta[3], 0.0);
-  EXPECT_EQ(view.i[3], view.i[2]);                  // the owner's sum goes on
-  EXPECT_EQ(view.row_j[3], row_size * view.i[3]);           // a pair with itself, which has no distance and is masked
-  EXPECT_EQ(view.to[3].partner, record_bytes * (view.i[3] - 100));  // and nothing is added to it
+  EXPECT_EQ(owner_of(view.to[3]), owner_of(view.to[2]));                // the owner's sum goes on
+  EXPECT_EQ(view.row_j[3], row_size * (100 + owner_of(view.to[3])));      // a pair with itself, which has no distance and is masked
+  EXPECT_EQ(view.to[3].partner, record_bytes * owner_of(view.to[3]));  // and nothing is added to it
   for (const double* column : {view.sp, view.tx, view.ty, view.tz, view.k_t_last}) EXPECT_EQ(column[3], 0.0);
 }
 
@@ -142,6 +144,7 @@ TEST(ActivePairs, RunsOfOneOwnerAmongThem) {
   for (int n = 0; n < 6; ++n) {
     EXPECT_EQ(again_of(view.to[n]), again[n] ? 0xff : 0);
     EXPECT_EQ(own_of(view.to[n]), static_cast<std::uint32_t>(record_bytes * (owner[n] - 100)));
+    EXPECT_EQ(owner_of(view.to[n]), owner[n] - 100);
   }
 }
 
@@ -151,7 +154,10 @@ TEST(OwnerRuns, FitTheLargestBatch) {
   PairTargets to[3] = {};
   find_owner_runs(i, 3, first, to);
   EXPECT_EQ(own_of(to[0]), 0u);
-  for (const int k : {1, 2}) EXPECT_EQ(own_of(to[k]), std::uint32_t{record_bytes} * (most_spheres_of_batch - 1));
+  for (const int k : {1, 2}) {
+    EXPECT_EQ(own_of(to[k]), std::uint32_t{record_bytes} * (most_spheres_of_batch - 1));
+    EXPECT_EQ(owner_of(to[k]), most_spheres_of_batch - 1);
+  }
   EXPECT_EQ(again_of(to[0]), 0);
   EXPECT_EQ(again_of(to[1]), 0);
   EXPECT_EQ(again_of(to[2]), 0xff);

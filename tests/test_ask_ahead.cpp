@@ -50,9 +50,9 @@ TEST(AskAhead, EverySphereOnce) {
   for (const Batch& b : sim.batches())
     for (const std::int32_t ahead : {1, 64, 300, 5000}) {
       PairBatch pairs{};
-      pairs.i = b.i.data(), pairs.count = b.padded, pairs.first = b.first, pairs.end = b.first + b.count;
+      pairs.to = b.to.data(), pairs.count = b.padded, pairs.first = b.first, pairs.end = b.first + b.count;
       pairs.ahead = ahead, pairs.spheres = sim.state().padded;
-      std::int32_t next_row = b.i[0], next_record = b.i[0];
+      std::int32_t next_row = b.i(0), next_record = b.i(0);
       for (std::int32_t start = 0; start < b.padded; start += chunk_size) {
         const AskedFor asked = asked_for(pairs, start);
         EXPECT_TRUE(asked.first >= asked.last_row || asked.first == next_row) << start;
@@ -77,7 +77,7 @@ TEST(AskAhead, ReachesBeyondMostPartners) {
   for (const Batch& b : sim.batches()) {
     EXPECT_GE(b.ahead, 256 + 72);
     EXPECT_LE(b.ahead, 256 + 288);
-    for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k) ++listed, within += b.j(k) - b.i[k] < b.ahead - 128 ? 1 : 0;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(b.used); ++k) ++listed, within += b.j(k) - b.i(k) < b.ahead - 128 ? 1 : 0;
   }
   EXPECT_GT(listed, 5000);
   EXPECT_GT(static_cast<double>(within), 0.85 * static_cast<double>(listed));

@@ -280,7 +280,7 @@ TEST(Bits, DefaultIsWithinItsBoundOfReproducible) {
               16.0 * u * (law.k2 * 2.0 * o.R + std::fabs(s.contacts.normal_force[k]) + 2.0 * law.beta_n * v) + q;
       const auto sum = [](const Simulation& sim, std::int32_t rank, int field) {
         const Batch& batch = sim.batches()[0];
-        const auto at = record_size * static_cast<std::size_t>(sim.state().place[static_cast<std::size_t>(rank)]) +
+        const auto at = record_size * static_cast<std::size_t>(sim.state().places()[static_cast<std::size_t>(rank)]) +
                         static_cast<std::size_t>(field);
         return batch.sum[at];
       };

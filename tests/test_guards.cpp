@@ -105,7 +105,7 @@ TEST(Guards, AForceBeyondAnyCredibleOne) {
       const std::string said = said_after(set, 1, [&](Particles& p, std::vector<Batch>& batches, std::size_t k) {
         for (Batch& b : batches)
           for (std::size_t m = 0; m < static_cast<std::size_t>(b.used); ++m)
-            if (static_cast<std::size_t>(b.i[m]) == k || static_cast<std::size_t>(b.j(m)) == k) {
+            if (static_cast<std::size_t>(b.i(m)) == k || static_cast<std::size_t>(b.j(m)) == k) {
               (std::isnan(wrong) ? b.tx : b.ty)[m] = wrong;
               // Without friction's limit nothing would be left of it: the pair is made to stick.
               b.sp[m] = -1.0;
@@ -148,7 +148,7 @@ TEST(Guards, AHistoryThatIsNoNumber) {
       const std::string said = said_after(set, 1, [&](Particles&, std::vector<Batch>& batches, std::size_t k) {
         for (Batch& b : batches)
           for (std::size_t m = 0; m < static_cast<std::size_t>(b.used); ++m)
-            if (static_cast<std::size_t>(b.i[m]) == k || static_cast<std::size_t>(b.j(m)) == k) b.tx[m] = nan;
+            if (static_cast<std::size_t>(b.i(m)) == k || static_cast<std::size_t>(b.j(m)) == k) b.tx[m] = nan;
       }, scenes::full_law(), energy);
       EXPECT_NE(said.find(energy ? "out of range at step 21 " : "out of range at step 22 "), std::string::npos) << to_string(set) << energy << said;
       EXPECT_NE(said.find("; sphere"), std::string::npos) << said;

@@ -188,5 +188,41 @@ TEST(Chunked, HoldsWhatARowWould) {
   }
 }
 
+TEST(Chunked, StretchesAcrossPieces) {
+  constexpr std::size_t piece = 8;
+  ChunkedArray<int, piece> chunked;
+  std::vector<int> row;
+  for (const std::size_t size : {3 * piece + 5, 2 * piece, piece - 1}) {
+    chunked.resize_to_overwrite(size);
+    row.resize(size);
+    for (std::size_t from = 0; from < size; from += 5) {
+      const std::size_t count = std::min<std::size_t>(5, size - from);
+      for (std::size_t k = from; k < from + count; ++k) row[k] = static_cast<int>(100 * size + k);
+      chunked.put(from, row.data() + from, count);
+    }
+    EXPECT_EQ(chunked.in_a_row(), row);
+    std::vector<int> back(size + 1, -1);
+    chunked.get(1, back.data(), size - 1);
+    EXPECT_TRUE(std::equal(row.begin() + 1, row.end(), back.begin()));
+    EXPECT_EQ(back[size - 1], -1);
+  }
+  chunked.release();
+  EXPECT_EQ(chunked.size(), 0u);
+  chunked.get(0, nullptr, 0);
+}
+
+// What an array of lists is given anew may lie where it was.
+TEST(AlignedArray, GivesBackBeforeItTakes) {
+  if (!pools) GTEST_SKIP() << "AddressSanitizer keeps what is given back";
+  AlignedArray<char> array;
+  array.assign(12'000'000, 'a');  // of a block of whole huge pages, which has half a MB more
+  const char* const place = array.data();
+  const std::size_t held = pool_use().held;
+  array.assign(12'100'000, 'b');
+  EXPECT_EQ(array.data(), place);
+  EXPECT_EQ(array[12'099'999], 'b');
+  EXPECT_EQ(pool_use().held, held);
+}
+
 }  // namespace
 }  // namespace platen

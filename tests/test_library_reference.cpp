@@ -58,7 +58,7 @@ PairLaw any_pair_law() {
 }
 
 Vec3 position(const Simulation& sim, std::size_t rank) {
-  const auto k = static_cast<std::size_t>(sim.state().place[rank]);
+  const auto k = static_cast<std::size_t>(sim.state().places()[rank]);
   return {sim.state().x[k], sim.state().y[k], sim.state().z[k]};
 }
 Vec3 row(const std::vector<double>& v, std::size_t rank) { return {v[3 * rank], v[3 * rank + 1], v[3 * rank + 2]}; }

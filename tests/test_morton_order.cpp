@@ -100,7 +100,7 @@ TEST(MortonOrder, SharedAmongThreads) {
     for (std::size_t k = 0; k < static_cast<std::size_t>(p.count); ++k) {
       p.rank[k] = static_cast<std::int32_t>(k);
       p.x[k] = places.x[k], p.y[k] = places.y[k], p.z[k] = places.z[k], p.vx[k] = 1.0 + static_cast<double>(k);
-      p.image[2 * k] = static_cast<std::int32_t>(k), p.image[2 * k + 1] = -static_cast<std::int32_t>(k);
+      p.image[2 * k] = static_cast<std::int32_t>(k), p.image[2 * k + 1] = 1 - static_cast<std::int32_t>(k), p.crossed[2 * k + 1] = -1;
       if (!equal) p.radius[k] = 0.4 + 1e-6 * static_cast<double>(k);
     }
     return p;
@@ -127,8 +127,10 @@ TEST(MortonOrder, SharedAmongThreads) {
       ASSERT_EQ(p.rank[k], order[k]);
       ASSERT_EQ(p.image[2 * k], order[k]);
       ASSERT_EQ(p.image[2 * k + 1], -order[k]);
-      ASSERT_EQ(p.place[from], static_cast<std::int32_t>(k));
+      ASSERT_EQ(p.crossed[2 * k + 1], 0);
     }
+    const std::vector<std::int32_t> place = p.places();
+    for (std::size_t k = 0; k < order.size(); ++k) ASSERT_EQ(place[static_cast<std::size_t>(order[k])], static_cast<std::int32_t>(k));
     for (auto k = static_cast<std::size_t>(p.count); k < static_cast<std::size_t>(p.padded); ++k) {
       EXPECT_EQ(p.x[k], 0.0);
       EXPECT_EQ(p.rank[k], -1);

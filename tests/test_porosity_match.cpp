@@ -335,7 +335,8 @@ std::vector<double> numbers(const std::string& list) {
 }
 
 TEST(PorosityMatchStudy, MeetsTheToleranceAlsoWhenInterrupted) {
-  const StudyFolder study(study_text, base_text);
+  // Two samples of 80 spheres differ by more than a tolerance of 0.003: whether a search meets it would hang on an instruction set's last bits.
+  const StudyFolder study(replaced("0.003", "0.006", study_text), base_text);
   const ProgramResult result = run_program(study.words("whole"));
   ASSERT_EQ(result.exit_code, 0) << result.report();
   const fs::path folder = study.folder / "whole";
@@ -349,7 +350,7 @@ TEST(PorosityMatchStudy, MeetsTheToleranceAlsoWhenInterrupted) {
     EXPECT_EQ(table.cell(k, "matched to"), "tiny-R2.5mm-s" + std::to_string(k + 1));
     wanted.push_back(table.number(k, "wanted porosity"));
     reached.push_back(table.number(k, "porosity"));
-    EXPECT_NEAR(reached[k], wanted[k], 0.003);
+    EXPECT_NEAR(reached[k], wanted[k], 0.006);
     tries += numbers(table.cell(k, "tried values")).size();
     const Case c = read_case(folder / "runs" / table.cell(k, "run") / "case.toml");
     EXPECT_EQ(*c.stages.front().porosity, table.number(k, "value"));

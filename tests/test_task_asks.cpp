@@ -167,7 +167,7 @@ TEST(TaskAsks, LinesOfABatch) {
         ++incoming;
       }
       for (const auto* column : {&b.sp, &b.tx, &b.ty, &b.tz}) contacts.push_back({column->data(), 8 * static_cast<std::size_t>(b.padded)});
-      contacts.push_back({b.i.data(), 4 * static_cast<std::size_t>(b.padded)}), contacts.push_back({b.row_j.data(), 4 * static_cast<std::size_t>(b.padded)});
+      contacts.push_back({b.row_j.data(), 4 * static_cast<std::size_t>(b.padded)});
       contacts.push_back({b.to.data(), 8 * static_cast<std::size_t>(b.padded)});
       contacts.push_back({b.owners_of_eight.data(), 12 * static_cast<std::size_t>(b.padded) / 8});
       for (const auto& [what, arrays] : {std::pair{false, state}, {true, contacts}}) {

@@ -175,7 +175,7 @@ TEST(TaskGraph, AccessesAreThoseOfTheLists) {
       EXPECT_TRUE(declares(TaskKind::contacts, k, k, resource_halo, true));
       EXPECT_TRUE(declares(TaskKind::contacts, k, k, resource_history, true));
       for (std::int32_t m = 0; m < b.used; ++m) {
-        EXPECT_EQ(batch_of(b.i[static_cast<std::size_t>(m)]), k);
+        EXPECT_EQ(batch_of(b.i(static_cast<std::size_t>(m))), k);
         const int other = batch_of(b.j(static_cast<std::size_t>(m)));
         EXPECT_TRUE(declares(TaskKind::contacts, k, other, resource_state, false)) << k << " reads " << other;
         foreign += other != k ? 1 : 0;

@@ -56,7 +56,8 @@ HeadOn head_on(const PairLaw& law, double R, double v, int steps_per_contact = 4
   for (int k = 0; k < 40 * steps_per_contact; ++k) {
     sim.advance(1);
     const auto& s = sim.state();
-    const auto i = static_cast<std::size_t>(s.place[0]), j = static_cast<std::size_t>(s.place[1]);
+    const std::vector<std::int32_t> places = s.places();
+    const auto i = static_cast<std::size_t>(places[0]), j = static_cast<std::size_t>(places[1]);
     const double overlap = 2.0 * R - (s.x[i] - s.x[j]);
     r.delta_max = std::max(r.delta_max, overlap);
     if (overlap > 0.0) continue;

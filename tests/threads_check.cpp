@@ -51,7 +51,8 @@ void remove_a_needed_edge(TaskTable& table) {
       table.remove_edge(static_cast<std::int32_t>(t), next);
       if (table.worker().empty()) return;
       for (std::size_t later = t; later < n; ++later) {
-        const auto successors = table.successors()[later];
+        const auto list = table.successors()[later];
+        const std::vector<std::int32_t> successors(list.begin(), list.end());  // removing moves them
         for (const std::int32_t other : successors) {
           const Task &a = table.tasks()[later], &b = table.tasks()[static_cast<std::size_t>(other)];
           if (a.kind == from.kind && a.batch == from.batch && b.kind == to.kind && b.batch == to.batch) table.remove_edge(static_cast<std::int32_t>(later), other);
