@@ -61,6 +61,7 @@ BatchCopy::BatchCopy(const Batch& b)
 PairBatch BatchCopy::pairs(const StateCopy& state) {
   PairBatch b{};
   b.rows = state.rows.data();
+  b.own_rows = b.rows + row_size * static_cast<std::int64_t>(first);
   b.row_j = row_j.data(), b.to = targets.data(), b.owners = owners.data();
   b.sp = sp.data(), b.tx = tx.data(), b.ty = ty.data(), b.tz = tz.data();
   b.k_t_last = k_t_last.empty() ? nullptr : k_t_last.data();

@@ -48,8 +48,8 @@ struct Inner {
   // Starts a list of those outer pairs that are closer than their margins.
   void choose(const Batch& batch, const Closer& closer) {
     const std::size_t outer = batch.outer_j.size();
-    outer_i.resize_to_overwrite(outer);
-    batch.outer_owned.for_each([&](std::int32_t own, std::int32_t first, std::int32_t end) { std::fill(outer_i.data() + first, outer_i.data() + end, batch.first + own); });
+    outer_i.resize_to_overwrite(outer + OwnedCounts::beyond);
+    batch.outer_owned.name_owners(batch.first, outer_i.data());
     listed.renew((outer + 63) / 64, 0);
     closer.choose(batch, outer_i.data(), listed.data());
     from.resize(outer);

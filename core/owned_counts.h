@@ -1,6 +1,8 @@
 // How many pairs of a list each sphere of a batch owns, in the order of both: mostly a byte each.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 
 #include "core/huge_pool.h"
@@ -15,6 +17,15 @@ class OwnedCounts {
     bytes_.push_back(static_cast<std::uint8_t>(pairs));
   }
   void fit() { bytes_.shrink_to_fit(); }
+  // Writes down whose each pair is, spheres counted from `first`; up to `beyond` places behind the last are written too.
+  void name_owners(std::int32_t first, std::int32_t* owner) const {
+    for (const std::uint8_t byte : bytes_) {
+      for (std::int32_t k = 0; k == 0 || k < byte; k += 4) std::fill_n(owner + k, 4, first);  // seldom more than once: no branch goes wrong
+      owner += byte;
+      first += byte == more ? 0 : 1;
+    }
+  }
+  static constexpr std::size_t beyond = 4;  // places
   // Calls visit(sphere, first, end) for each sphere with its pairs, counted from 0.
   template <class Visit>
   void for_each(const Visit& visit) const {

@@ -339,7 +339,7 @@ void Simulation::contacts(Batch& b, std::int64_t step, const LawConstants& law, 
   const auto nothing = static_cast<std::int32_t>(b.sum.size() * sizeof(double)) - record_bytes;
   const bool dense = is_dense(b);
   const auto state = [&](const AlignedArray<double>& a) { return moves_in_rows_ ? nullptr : a.data() + b.first; };
-  PairBatch pairs{particles_.rows.data(), b.row_j.data(), b.to.data(), b.owners_of_eight.data(), b.sp.data(), b.tx.data(),
+  PairBatch pairs{particles_.rows.data(), particles_.rows.data() + row_size * static_cast<std::int64_t>(b.first), b.row_j.data(), b.to.data(), b.owners_of_eight.data(), b.sp.data(), b.tx.data(),
                   b.ty.data(), b.tz.data(), b.k_t_last.empty() ? nullptr : b.k_t_last.data(), b.sum.data(), b.first, b.padded, b.first + b.count, nothing, dense, leap,
                   state(particles_.x), state(particles_.y), state(particles_.z), state(particles_.vx), state(particles_.vy), state(particles_.vz), state(particles_.ux),
                   state(particles_.uy), state(particles_.uz), moves_in_rows_ && kernels_.stages ? stage_of_this_thread(b.count) : nullptr, dense && asks_for_partners() ? b.ahead : 0, particles_.padded, asks_history_, nullptr, 0, 0};

@@ -344,20 +344,18 @@ bool Simulation::unlisted_apart(int steps, const std::vector<char>& beyond) cons
       if (std::find(list.particle.begin(), list.particle.begin() + list.used, static_cast<std::int32_t>(k)) == list.particle.begin() + list.used) return false;
     }
   }
+  std::vector<std::int32_t> owner;
   for (const Batch& b : batches_) {
-    bool all_apart = true;
-    b.outer_owned.for_each([&](std::int32_t own, std::int32_t first, std::int32_t end) {
-      if (!all_apart) return;
-      for (auto m = static_cast<std::size_t>(first); m < static_cast<std::size_t>(end); ++m) {
-        if (b.listed[m / 64] >> (m % 64) & 1) continue;
-        const auto i = static_cast<std::size_t>(b.first + own), j = static_cast<std::size_t>(b.outer_j[m]);
-        if (!beyond[i] && !beyond[j]) continue;
-        const double dx = domain_.nearest_x(before(i, 0) - before(j, 0)), dy = domain_.nearest_y(before(i, 1) - before(j, 1));
-        const double apart = std::hypot(dx, dy, before(i, 2) - before(j, 2)) - particles_.radius_of(b.first + own) - particles_.radius_of(b.outer_j[m]);
-        all_apart = all_apart && way(i) + way(j) <= apart;
-      }
-    });
-    if (!all_apart) return false;
+    owner.resize(b.outer_j.size() + OwnedCounts::beyond);
+    b.outer_owned.name_owners(b.first, owner.data());
+    for (std::size_t m = 0; m < b.outer_j.size(); ++m) {
+      if (b.listed[m / 64] >> (m % 64) & 1) continue;
+      const auto i = static_cast<std::size_t>(owner[m]), j = static_cast<std::size_t>(b.outer_j[m]);
+      if (!beyond[i] && !beyond[j]) continue;
+      const double dx = domain_.nearest_x(before(i, 0) - before(j, 0)), dy = domain_.nearest_y(before(i, 1) - before(j, 1));
+      const double apart = std::hypot(dx, dy, before(i, 2) - before(j, 2)) - particles_.radius_of(owner[m]) - particles_.radius_of(b.outer_j[m]);
+      if (!(way(i) + way(j) <= apart)) return false;
+    }
   }
   return true;
 }

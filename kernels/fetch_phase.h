@@ -26,9 +26,8 @@ PLATEN_INLINE void fetch_owners(const PairBatch& b, int first_part, std::int32_t
     }
   }
   std::int32_t owners[I::width];  // no list names them: it would be one more to follow
-  for (int lane = 0; lane < I::width; ++lane) owners[lane] = owner_of(b.to[k + lane]);
-  const double* const rows = b.rows + row_size * static_cast<std::int64_t>(b.first);
-  for (int part = 0; part < parts; ++part) f[part] = fetch_part<I, row_size>(rows, first_part + part, owners);
+  for (int lane = 0; lane < I::width; ++lane) owners[lane] = owner_row(b.to[k + lane]);
+  for (int part = 0; part < parts; ++part) f[part] = fetch_part<I, 1>(b.own_rows, first_part + part, owners);
 }
 
 // Distance, normal and overlap of `width` pairs from `k` on.

@@ -10,6 +10,11 @@ PLATEN_INLINE std::uint32_t own_of(const PairTargets& to) { return to.own_and_ag
 PLATEN_INLINE std::uint8_t again_of(const PairTargets& to) { return static_cast<std::uint8_t>(to.own_and_again); }
 // The owner itself, counted from the batch's first particle.
 PLATEN_INLINE std::int32_t owner_of(const PairTargets& to) { return static_cast<std::int32_t>(to.own_and_again >> 14); }
+// Its row, in doubles from that of the batch's first particle: 12 times the owner, in as many instructions as if a list had named it.
+PLATEN_INLINE std::int32_t owner_row(const PairTargets& to) {
+  static_assert(row_size == 3 * 4 && record_bytes == 64);
+  return static_cast<std::int32_t>(3 * (to.own_and_again >> 12));
+}
 
 // Puts that into the targets of `count` contacts, owned by i, ascending. `first`: the batch's first particle, less than
 // most_spheres_of_batch before any of them.

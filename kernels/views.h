@@ -95,6 +95,7 @@ struct AskedLines {
 
 struct PairBatch {
   const double* rows;
+  const double* own_rows;  // of the batch's first particle, where owners' rows are counted from
   const std::int32_t* row_j;
   const PairTargets* to;
   const OwnersOfEight* owners;  // of each eight contacts

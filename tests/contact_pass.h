@@ -39,7 +39,7 @@ inline Pass pass(const Simulation& sim, const Batch& b, bool dense, double leap_
   AlignedArray<double> stage;
   if (in_rows) stage.resize(static_cast<std::size_t>(9 * stage_column(b.count)));
   const auto state = [&](const AlignedArray<double>& column) { return in_rows ? nullptr : column.data() + b.first; };
-  PairBatch pairs{p.rows.data(), b.row_j.data(), b.to.data(), b.owners_of_eight.data(), sp.data(), tx.data(), ty.data(), tz.data(),
+  PairBatch pairs{p.rows.data(), p.rows.data() + row_size * static_cast<std::int64_t>(b.first), b.row_j.data(), b.to.data(), b.owners_of_eight.data(), sp.data(), tx.data(), ty.data(), tz.data(),
                   k_t.empty() ? nullptr : k_t.data(), sum.data(), b.first, b.padded, b.first + b.count, nothing, dense, leap_bound,
                   state(p.x), state(p.y), state(p.z), state(p.vx), state(p.vy), state(p.vz), state(p.ux), state(p.uy), state(p.uz), stage.data(), ahead, p.padded, ahead != 0, nullptr, 0, 0};
   others.put_into(pairs);

@@ -157,6 +157,7 @@ TEST(OwnerRuns, FitTheLargestBatch) {
   for (const int k : {1, 2}) {
     EXPECT_EQ(own_of(to[k]), std::uint32_t{record_bytes} * (most_spheres_of_batch - 1));
     EXPECT_EQ(owner_of(to[k]), most_spheres_of_batch - 1);
+    EXPECT_EQ(owner_row(to[k]), row_size * (most_spheres_of_batch - 1));
   }
   EXPECT_EQ(again_of(to[0]), 0);
   EXPECT_EQ(again_of(to[1]), 0);

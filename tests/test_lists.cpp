@@ -289,8 +289,8 @@ TEST(Batches, ShareWhatLiesBetweenThem) {
       int owned[2] = {0, 0}, listed = 0;
       for (std::size_t k = 0; k < 2; ++k) {
         const Batch& b = sim.batches()[k];
-        std::vector<std::int32_t> owner(b.outer_j.size(), -1);
-        b.outer_owned.for_each([&](std::int32_t own, std::int32_t first, std::int32_t end) { std::fill(owner.begin() + first, owner.begin() + end, b.first + own); });
+        std::vector<std::int32_t> owner(b.outer_j.size() + OwnedCounts::beyond, -1);
+        b.outer_owned.name_owners(b.first, owner.data());
         for (std::size_t m = 0; m < b.outer_j.size(); ++m) {
           const std::int32_t i = owner[m], j = b.outer_j[m];
           ASSERT_GE(i, b.first);

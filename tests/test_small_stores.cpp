@@ -38,6 +38,12 @@ TEST(OwnedCounts, AnyNumberOfEach) {
     begin = end;
   });
   EXPECT_EQ(spheres, counts.size());
+  std::vector<std::int32_t> expected, owner(static_cast<std::size_t>(begin) + OwnedCounts::beyond + 1, -1);
+  for (std::size_t k = 0; k < counts.size(); ++k) expected.insert(expected.end(), static_cast<std::size_t>(counts[k]), 70 + static_cast<std::int32_t>(k));
+  owned.name_owners(70, owner.data());
+  EXPECT_EQ(owner.back(), -1);
+  owner.resize(expected.size());
+  EXPECT_EQ(owner, expected);
 }
 
 TEST(TaskSuccessors, FromThoseWhoWait) {
