@@ -344,8 +344,15 @@ bool Simulation::unlisted_apart(int steps, const std::vector<char>& beyond) cons
       if (std::find(list.particle.begin(), list.particle.begin() + list.used, static_cast<std::int32_t>(k)) == list.particle.begin() + list.used) return false;
     }
   }
+  std::vector<char> has_some;  // of each batch: mostly few have
+  for (const Batch& b : batches_) {
+    const auto end = beyond.begin() + std::min(b.first + b.count, particles_.count);
+    has_some.push_back(std::find(beyond.begin() + b.first, end, 1) != end);
+  }
   std::vector<std::int32_t> owner;
   for (const Batch& b : batches_) {
+    const auto concerned = [&](int number) { return has_some[static_cast<std::size_t>(number)] != 0; };
+    if (!concerned(static_cast<int>(&b - batches_.data())) && std::none_of(b.partners.begin(), b.partners.end(), concerned)) continue;
     owner.resize(b.outer_j.size() + OwnedCounts::beyond);
     b.outer_owned.name_owners(b.first, owner.data());
     for (std::size_t m = 0; m < b.outer_j.size(); ++m) {
