@@ -36,7 +36,7 @@ class ChunkedArray {
   }
   void assign(const std::vector<T>& from) {
     resize_to_overwrite(from.size());
-    for (std::size_t k = 0; k < pieces_.size(); ++k) std::copy_n(from.data() + k * piece, pieces_[k].size(), pieces_[k].data());
+    put(0, from.data(), from.size());
   }
   std::vector<T> in_a_row() const {
     std::vector<T> all;

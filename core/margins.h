@@ -14,7 +14,7 @@ namespace platen {
 
 struct Margins {
   AlignedArray<float> of;  // per particle [m]
-  double largest = 0.0;    // [m]
+  double largest = 0.0;    // of outer ones, which the search needs [m]
 };
 
 // A number of single precision not above x >= 0, the largest or the one or two next to it.

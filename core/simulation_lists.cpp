@@ -179,7 +179,7 @@ bool Simulation::choose_margins(bool fresh, const AlignedArray<double>& speeds) 
   const double least_path = n > 0 ? caution * kick_factor_ * sum_of(speeds) / static_cast<double>(n) * dt_ : 0.0;
   kick_factor_ = std::max(1.0, 0.97 * kick_factor_);
   struct Found {
-    double inner_sum = 0.0, outer_sum = 0.0, inner_largest = 0.0, outer_largest = 0.0;
+    double inner_sum = 0.0, outer_sum = 0.0, outer_largest = 0.0;
     bool enough = true;
   };
   std::vector<Found> found(static_cast<std::size_t>(stretches_of(n)));
@@ -201,17 +201,17 @@ bool Simulation::choose_margins(bool fresh, const AlignedArray<double>& speeds) 
         inner = std::min(inner, left);
       }
       inner = inner_.of[k] = rounded_down(inner);
-      now.inner_sum += inner, now.inner_largest = std::max(now.inner_largest, inner);
+      now.inner_sum += inner;
     }
     found[static_cast<std::size_t>(part)] = now;
   });
   Found all;
   for (const Found& of : found) {
-    all.inner_sum += of.inner_sum, all.inner_largest = std::max(all.inner_largest, of.inner_largest);
+    all.inner_sum += of.inner_sum;
     all.outer_sum += of.outer_sum, all.outer_largest = std::max(all.outer_largest, of.outer_largest);
     all.enough = all.enough && of.enough;
   }
-  inner_.largest = all.inner_largest, inner_sum_ = all.inner_sum;
+  inner_sum_ = all.inner_sum;
   if (fresh) outer_.largest = all.outer_largest;
   if (n > 0) counters_.gap = 2.0 * all.inner_sum / static_cast<double>(n);
   if (n > 0 && fresh) counters_.skin = 2.0 * all.outer_sum / static_cast<double>(n);
