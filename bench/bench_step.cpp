@@ -24,7 +24,7 @@ void common(CLI::App& mode) {
   mode.add_option("--warm", options.warm, "steps before anything is timed");
   mode.add_option("-r,--rounds", options.rounds, "blocks that count");
   mode.add_option("--batch", options.batch, "particles in a batch; 0 = chosen");
-  mode.add_option("--cache", options.cache, "that the order of a large bed's tasks counts on, in MiB for each thread; 0 = chosen");
+  mode.add_option("--cache", options.cache, "that cuts and orders of a large bed's tasks count on, in MiB for each thread; 0 = chosen");
   mode.add_option("--unroll", options.unroll, "most steps between two looks at the lists; 0 = chosen");
   mode.add_option("--skin", options.skin, "of the outer lists, in radii; 0 = chosen");
   mode.add_option("--gap", options.gap, "of the inner lists, in radii; 0 = chosen");

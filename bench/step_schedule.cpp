@@ -11,6 +11,7 @@
 #include "bench/step_modes.h"
 #include "core/flow_graph.h"
 #include "core/task_order.h"
+#include "core/third_cache.h"
 
 namespace platen::bench {
 
@@ -96,14 +97,15 @@ void table_of_schedules(const StepOptions& o) {
     for (const int workers : either(o.threads, {1, 2, 4, 8, 16, 32, 64})) {
       const InstructionSet set = sets_of(o).front();
       BenchEngine engine = engine_of(o, set, 1);
-      if (engine.batch == 0) engine.batch = static_cast<int>(particles) / automatic_batches(static_cast<std::int32_t>(particles), workers, workers == 2);
+      const double cache = engine.cache > 0.0 ? engine.cache : ordered_cache();
+      if (engine.batch == 0) engine.batch = static_cast<int>(particles) / automatic_batches(static_cast<std::int32_t>(particles), workers, workers == 2, cache);
       const auto sim = make_simulation(bed, scene, engine);
       sim->advance(64);
       sim->rebuild_now();
       ParallelForStep tasks(*sim, scene.law, scene.gravity, 1);
       const std::vector<ParallelForStep::BatchTimes> times = tasks.times(40);
       TaskTable graph(sim->batches(), 32, false);
-      const bool large = order_if_large(graph, sim->batches(), ordered_cache, workers) > 0.0;
+      const bool large = order_if_large(graph, sim->batches(), cache, workers) > 0.0;
       if (!large && workers > 2) deal_out(graph, sim->batches(), workers);
       const double overhead = overhead_of_a_task(graph);
       std::vector<double> cost;

@@ -12,7 +12,7 @@ int possible(std::int32_t padded, int count) { return std::clamp(count, 1, std::
 
 }  // namespace
 
-int automatic_batches(std::int32_t particles, int threads, bool even) {
+int automatic_batches(std::int32_t particles, int threads, bool even, double cache) {
   // Fewer and larger batches have fewer pairs across and cost the graph less. Where work lies unevenly on two threads about three to
   // eight for each even the load out, eight from 2,048 spheres each on, where a task is long against what the graph takes for it. More
   // threads have two each, so that what one waits for is done while it does the other, or as many more as have 2,048 spheres, up to
@@ -20,7 +20,7 @@ int automatic_batches(std::int32_t particles, int threads, bool even) {
   // by batch in an order of their own, which needs small ones [core/task_order.h, docs/decisions.md].
   threads = std::max(1, threads);
   constexpr int least = 256;
-  const int largest = particles > particles_in_cache ? 2048 : 20000, each = std::max(1, (particles + threads * largest - 1) / (threads * largest));
+  const int largest = particles > particles_in(cache) ? 2048 : 20000, each = std::max(1, (particles + threads * largest - 1) / (threads * largest));
   int count = threads * each;
   if (threads > 2)
     count = threads * std::max(each, particles < 2 * least * threads ? 1 : std::clamp(particles / 2048 / threads, 2, 8));

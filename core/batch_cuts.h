@@ -8,12 +8,12 @@
 
 namespace platen {
 
-// About as many particles, with their contacts, as the third cache of common processors holds.
-inline constexpr std::int32_t particles_in_cache = 60000;
+// About as many particles, with their contacts, as fit into twice the bytes of a cache that one counts on [core/third_cache.h].
+constexpr double particles_in(double cache) { return cache / 210.0; }
 
 // Batches where nothing else is asked for: enough for all threads, none too small to be worth a task.
-// `even`: equal stretches of the Morton curve are equal work; of interest to two threads only.
-int automatic_batches(std::int32_t particles, int threads, bool even);
+// `even`: equal stretches of the Morton curve are equal work; of interest to two threads only. `cache`: bytes that one counts on.
+int automatic_batches(std::int32_t particles, int threads, bool even, double cache);
 // Batches of about so many particles each, none of more than most_spheres_of_batch.
 int batches_of(std::int32_t padded, int size);
 

@@ -26,6 +26,7 @@
 #include "core/step_graph.h"
 #include "core/task_asks.h"
 #include "core/task_order.h"
+#include "core/third_cache.h"
 #include "kernels/kernel_table.h"
 #include "kernels/law_parameters.h"
 
@@ -61,7 +62,7 @@ struct EngineOptions {
   InstructionSet instruction_set = InstructionSet::scalar;
   Executor executor = Executor::automatic;
   bool fused = false;       // one task per batch and step instead of two
-  double cache = ordered_cache;  // that the order of tasks counts on in larger beds; a worker whose part is above half of it asks ahead, up to twice as much if that is quicker [bytes]
+  double cache = ordered_cache();  // that cuts and orders of tasks count on in larger beds; a worker whose part is above half of it asks ahead, up to twice as much if that is quicker [bytes]
   std::function<void(TaskTable&)> tamper;  // for tests: changes every table of tasks before it is used
 };
 

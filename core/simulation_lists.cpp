@@ -411,7 +411,7 @@ void Simulation::rebuild_with(const PairHistories& pairs) {
 
 // `even`: equal stretches of the curve are equal work.
 int Simulation::batch_count(bool even) const {
-  return engine_.batch > 0 ? batches_of(particles_.padded, engine_.batch) : automatic_batches(particles_.count, engine_.threads, even);
+  return engine_.batch > 0 ? batches_of(particles_.padded, engine_.batch) : automatic_batches(particles_.count, engine_.threads, even, engine_.cache);
 }
 
 void Simulation::cut_into_batches(const PairHistories& pairs, const std::int32_t* bucket, const Cuts& cuts) {
@@ -429,7 +429,7 @@ void Simulation::cut_into_batches(const PairHistories& pairs, const std::int32_t
 void Simulation::rebuild_from(const PairHistories& pairs, const std::vector<PlateHistory>& plates, const ChunkedArray<double>* sums) {
   const ParallelFor run = on_workers();
   // Several threads share the work of a bed in the cache; the batches of a larger one go where there is room [core/task_order.h].
-  const bool shared = engine_.threads > 1 && particles_.count <= particles_in_cache;
+  const bool shared = engine_.threads > 1 && particles_.count <= particles_in(engine_.cache);
   // Fused, two batches would take turns.
   const bool even = engine_.threads == 2 && !engine_.fused && (batches_.empty() || work_is_even(batches_, engine_.threads));
   const Cuts cuts = shared && !batches_.empty() ? cuts_of_equal_work(batches_, particles_.padded, batch_count(even)) : equal_cuts(particles_.padded, batch_count(even));

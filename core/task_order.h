@@ -20,10 +20,6 @@
 
 namespace platen {
 
-// Bytes of a cache that the order counts on: part of the third cache of common processors, since threads, other programs and what
-// the count leaves out want some too. More brings little.
-inline constexpr double ordered_cache = 12 << 20;
-
 // What a cache that forgets what was not touched for longest takes in from memory, if the tasks run as the table has them [bytes];
 // of such caches, one for each worker, where the tasks have workers.
 double bytes_from_memory(const TaskTable& table, const std::vector<Batch>& batches, double cache);

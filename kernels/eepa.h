@@ -11,6 +11,7 @@
 #include "kernels/five_thirds.h"
 #include "kernels/power.h"
 #include "kernels/scene.h"
+#include "kernels/twice.h"
 #include "kernels/vec3.h"
 #include "kernels/views.h"
 
@@ -97,16 +98,27 @@ template <class I>
 PLATEN_INLINE typename I::Mask slides_at(const typename I::Real& limit, const typename I::Real& size2) {
   return I::not_less(size2, limit * limit);
 }
-// What is left of it, 0..1.
+// Whether any of these contacts slides; what is not touching counts for nothing. In a bed that holds few do: of four mostly none, which a
+// branch is worth, of sixteen mostly some, and nobody asks.
+template <class I>
+PLATEN_INLINE bool some_slide(const typename I::Mask& slides, const typename I::Mask& touching) {
+  if constexpr (interleaved<I>)
+    return true;
+  else
+    return I::any(I::both(slides, touching));
+}
+// What is left of it, 0..1; of a pair that is not touching any number.
 template <class I, bool exact>
-PLATEN_INLINE typename I::Real cut_to(const typename I::Real& limit, const typename I::Real& size2, const typename I::Mask& slides) {
+PLATEN_INLINE typename I::Real cut_to(const typename I::Real& limit, const typename I::Real& size2, const typename I::Mask& slides, bool some) {
+  if (!some) return I::set(1.0);
   return I::where(slides, limit * inverse_sqrt<I, exact>(I::max(size2, I::set(0x1p-900))), I::set(1.0));
 }
 
 // 2 k_t times the energy that sliding takes where T, |T|^2 = size2, is cut to T_new = back T: the work of the mean of the
 // turned and the new spring over the slip that did not stretch it, (turned + T_new) . (T - T_new), with along = turned . T [N2].
 template <class I>
-PLATEN_INLINE typename I::Real sliding_loss(const typename I::Mask& slides, const typename I::Real& back, const typename I::Real& size2, const typename I::Real& along) {
+PLATEN_INLINE typename I::Real sliding_loss(const typename I::Mask& slides, bool some, const typename I::Real& back, const typename I::Real& size2, const typename I::Real& along) {
+  if (!some) return I::set(0.0);
   return I::where(slides, (I::set(1.0) - back) * I::fma(back, size2, along), I::set(0.0));
 }
 

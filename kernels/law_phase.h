@@ -106,10 +106,11 @@ PLATEN_INLINE void slips_of_pairs(Chunk<scene>& chunk, int at, const PairBatch& 
   const Real size2 = dot(T, T);
   const Real limit = pairs.limit();
   const auto slides = slides_at<I>(limit, size2);
-  const Real back = cut_to<I, exact>(limit, size2, slides);
+  const bool some = some_slide<I>(slides, touching);
+  const Real back = cut_to<I, exact>(limit, size2, slides, some);
   const Vec3<I> T_new = where<I>(touching, scale<I>(back, T), none);
   if constexpr (scene.energy) {
-    const Real loss = sliding_loss<I>(slides, back, size2, dot(pairs.turned(), T));
+    const Real loss = sliding_loss<I>(slides, some, back, size2, dot(pairs.turned(), T));
     if constexpr (scene.exponent == Exponent::one) {
       sums.add(&Energy::sliding, I::where(touching, loss, zero) * I::set(c.half_over_k_t), c);
     } else {

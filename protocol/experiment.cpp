@@ -74,6 +74,7 @@ void Experiment::describe_run() {
   RunInfo info;
   info.title = c_.title, info.seed = c_.seed, info.threads = options_.threads;
   info.instruction_set = to_string(kernels.instruction_set);
+  info.reproducible = reproducible();
   info.scene = built_scenes[static_cast<std::size_t>(kernels.scene)].name;
   info.contacts = c_.output.contacts;
   folder_.set_info(info);
@@ -82,9 +83,12 @@ void Experiment::describe_run() {
                         {"dt", sim_->time_step()}, {"step", sim_->step()}});
 }
 
+bool Experiment::reproducible() const { return from_ != nullptr ? from_->reproducible : options_.reproducible; }
+
 Performance Experiment::performance() const {
   Performance p;
   p.threads = options_.threads;
+  p.reproducible = reproducible();
   p.wall_seconds = wall_clock() - wall_begin_;
   if (!sim_) return p;
   p.instruction_set = to_string(sim_->kernels().instruction_set);

@@ -43,7 +43,7 @@ void Experiment::keep(nlohmann::json stage) {
   checkpoint.experiment = experiment.dump();
   checkpoint.case_text = c_.text, checkpoint.start_time = folder_.start_time();
   checkpoint.instruction_set = to_string(sim_->kernels().instruction_set);
-  checkpoint.reproducible = from_ ? from_->reproducible : options_.reproducible;
+  checkpoint.reproducible = reproducible();
   if (from_) checkpoint.density = from_->density;
   else if (c_.particles.table) checkpoint.density = densities_by_id(*c_.particles.table);
   else checkpoint.density = {c_.particles.density};

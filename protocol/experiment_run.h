@@ -37,6 +37,7 @@ class Experiment {
   // ---- stages
   void describe_run();
   Performance performance() const;
+  bool reproducible() const;
   // What the hash must cover besides the bed: where the protocol stands.
   std::string stage_state() const;
   Course begin_stage(std::size_t index, Stand& stand, Stage& stage);

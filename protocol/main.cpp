@@ -188,6 +188,7 @@ Command add_study(CLI::App& program) {
       ->type_name("KEY=VALUE")
       ->take_all()
       ->allow_extra_args(false);
+  app->add_flag("--reproducible", command->reproducible, "the same bits on every instruction set; somewhat slower");
   app->add_flag("--dry-run", command->dry_run, "print the runs and end");
   app->add_flag("-q,--quiet", command->quiet, "print nothing but errors, and warnings about files");
   return {app, "platen study protocol/studies/fig4-7.toml -o studies/fig4-7", [=] {

@@ -29,6 +29,7 @@ struct RunInfo {
   std::uint64_t seed = 0;
   int threads = 1;
   std::string instruction_set;
+  bool reproducible = false;
   std::string scene;      // kernel variant
   bool contacts = true;   // output.contacts of the case: /contacts and /plate_contacts in results.h5
 };

@@ -54,6 +54,7 @@ struct StageResult {
 struct Performance {
   int threads = 1;
   std::string instruction_set, scene;
+  bool reproducible = false;  // operations that are the same on every instruction set
   std::int64_t particle_steps = 0;
   double wall_seconds = 0.0;
   std::int64_t rebuilds = 0, prunes = 0;

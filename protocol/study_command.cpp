@@ -133,6 +133,7 @@ int study_command(const StudyCommand& command) {
   // Everything that can be wrong with the study is found before the folder is touched.
   const Study study = read_study(command.study_file, command.overrides);
   StudyPlan plan = make_plan(study);
+  for (Job& job : plan.jobs) job.reproducible = command.reproducible;
   if (command.dry_run) {
     print(plan_table(plan, command.folder));
     return exit_done;
@@ -162,7 +163,7 @@ int study_command(const StudyCommand& command) {
     spdlog::info("{}: {} runs, {}, into {}", command.study_file.filename().string(), plan.jobs.size(),
                  runs_at_a_time(plan, options.jobs), command.folder.string());
   const auto other = std::count_if(plan.jobs.begin(), plan.jobs.end(), [&](const Job& job) { return holds_another(command.folder, job); });
-  if (other > 0 && !command.quiet) spdlog::warn("{} finished run{} of other cases in {} {} made anew", other, other == 1 ? "" : "s", command.folder.string(), other == 1 ? "is" : "are");
+  if (other > 0 && !command.quiet) spdlog::warn("{} finished run{} of other cases{} in {} {} made anew", other, other == 1 ? "" : "s", command.reproducible ? ", or without --reproducible," : "", command.folder.string(), other == 1 ? "is" : "are");
   const std::vector<JobOutcome> outcomes = run_jobs(plan, options);
   printer.clear();
 

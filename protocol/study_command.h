@@ -13,6 +13,7 @@ struct StudyCommand {
   std::filesystem::path folder;        // of the results; taken up again where it holds the same study
   std::vector<std::string> overrides;  // --set, of the study: study.seeds=[1,2,3]
   std::optional<int> jobs;             // runs at a time; default: usable_cores()
+  bool reproducible = false;           // all runs: the same bits on every instruction set
   bool dry_run = false;                // print the runs and end
   bool quiet = false;
 };

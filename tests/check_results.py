@@ -90,8 +90,8 @@ def check_folder(folder):
             assert (pair[:, 0] < pair[:, 1]).all()
         with open(f"{folder}/case.toml", encoding="utf-8") as text:
             assert file["case"].asstr()[()] == text.read()
-        for key in ("program", "version", "title", "seed", "threads", "instruction_set", "scene", "start_time", "host",
-                    "compiler"):
+        for key in ("program", "version", "title", "seed", "threads", "instruction_set", "reproducible", "scene", "start_time",
+                    "host", "compiler"):
             assert key in file["provenance"].attrs, key
 
         with open(f"{folder}/summary.json", encoding="utf-8") as text:

@@ -149,10 +149,10 @@ inline Profile profile(int stage) {
 }
 
 inline RunInfo info(bool contacts = true) {
-  return {"sample: R = 2.5 mm, \u03c3", 7, 2, "avx2", "adhesive", contacts};
+  return {"sample: R = 2.5 mm, \u03c3", 7, 2, "avx2", true, "adhesive", contacts};
 }
 
-inline Performance performance() { return {2, "avx2", "adhesive", 64000, 2.0, 3}; }
+inline Performance performance() { return {2, "avx2", "adhesive", true, 64000, 2.0, 3}; }
 
 inline void append_stage(RunFolder& run, int stage) {
   for (int k = 0; k < rows_per_stage; ++k) run.append(row(stage, k), stage);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/batch_cuts.h"
+#include "core/third_cache.h"
 #include "tests/scenes.h"
 
 namespace platen {
@@ -22,29 +23,29 @@ std::vector<Batch> batches_with(std::int32_t spheres, std::initializer_list<std:
 }
 
 TEST(AutomaticBatches, OneForEachThreadWhereWorkIsEven) {
-  EXPECT_EQ(automatic_batches(5000, 1, false), 1);
-  EXPECT_EQ(automatic_batches(17213, 1, true), 1);
-  EXPECT_EQ(automatic_batches(35000, 1, true), 2);  // none has more than 20,000
-  for (const int particles : {5000, 17213, 35000}) EXPECT_EQ(automatic_batches(particles, 2, true), 2);
-  for (const int threads : {1, 2, 16}) EXPECT_EQ(automatic_batches(300, threads, false), 1);
-  for (const int threads : {0, 1, 2, 3}) EXPECT_EQ(automatic_batches(0, threads, true), 1);
+  EXPECT_EQ(automatic_batches(5000, 1, false, most_ordered_cache), 1);
+  EXPECT_EQ(automatic_batches(17213, 1, true, most_ordered_cache), 1);
+  EXPECT_EQ(automatic_batches(35000, 1, true, most_ordered_cache), 2);  // none has more than 20,000
+  for (const int particles : {5000, 17213, 35000}) EXPECT_EQ(automatic_batches(particles, 2, true, most_ordered_cache), 2);
+  for (const int threads : {1, 2, 16}) EXPECT_EQ(automatic_batches(300, threads, false, most_ordered_cache), 1);
+  for (const int threads : {0, 1, 2, 3}) EXPECT_EQ(automatic_batches(0, threads, true, most_ordered_cache), 1);
 }
 
 TEST(AutomaticBatches, SeveralForEachOfTwoThreadsWhereItIsNot) {
-  EXPECT_EQ(automatic_batches(5000, 2, false), 6);
-  EXPECT_EQ(automatic_batches(35000, 2, false), 16);
+  EXPECT_EQ(automatic_batches(5000, 2, false, most_ordered_cache), 6);
+  EXPECT_EQ(automatic_batches(35000, 2, false, most_ordered_cache), 16);
 }
 
 // What one waits for is done while it does the other.
 TEST(AutomaticBatches, TwoOrMoreForEachOfManyThreads) {
-  EXPECT_EQ(automatic_batches(35000, 4, true), 16);
-  EXPECT_EQ(automatic_batches(35000, 16, true), 32);
-  EXPECT_EQ(automatic_batches(35000, 16, false), 32);
-  EXPECT_EQ(automatic_batches(5000, 8, true), 16);
-  EXPECT_EQ(automatic_batches(5000, 16, true), 16);  // 312 spheres each; two would be small
-  EXPECT_EQ(automatic_batches(50000, 3, true), 24);
-  EXPECT_EQ(automatic_batches(2000, 16, true), 7);   // fewer than threads
-  for (const int threads : {3, 5, 16, 64}) EXPECT_EQ(automatic_batches(50000, threads, true) % threads, 0);
+  EXPECT_EQ(automatic_batches(35000, 4, true, most_ordered_cache), 16);
+  EXPECT_EQ(automatic_batches(35000, 16, true, most_ordered_cache), 32);
+  EXPECT_EQ(automatic_batches(35000, 16, false, most_ordered_cache), 32);
+  EXPECT_EQ(automatic_batches(5000, 8, true, most_ordered_cache), 16);
+  EXPECT_EQ(automatic_batches(5000, 16, true, most_ordered_cache), 16);  // 312 spheres each; two would be small
+  EXPECT_EQ(automatic_batches(50000, 3, true, most_ordered_cache), 24);
+  EXPECT_EQ(automatic_batches(2000, 16, true, most_ordered_cache), 7);   // fewer than threads
+  for (const int threads : {3, 5, 16, 64}) EXPECT_EQ(automatic_batches(50000, threads, true, most_ordered_cache) % threads, 0);
 }
 
 // From the first step on, since a bed at rest may not make its lists anew for long.
@@ -67,7 +68,30 @@ TEST(AutomaticBatches, WhetherWorkIsEvenIsKnownAtOnce) {
 TEST(AutomaticBatches, NoneIsTooLarge) {
   for (const int threads : {1, 2, 4, 16})
     for (const std::int32_t particles : {35'000, 280'000, 1'000'000, 5'000'000})
-      EXPECT_LE(particles / automatic_batches(particles, threads, true), particles > particles_in_cache ? 2048 : 20000);
+      EXPECT_LE(particles / automatic_batches(particles, threads, true, most_ordered_cache), particles > particles_in(most_ordered_cache) ? 2048 : 20000);
+}
+
+TEST(AutomaticBatches, SmallOnesWhereTheCacheIsSmall) {
+  EXPECT_EQ(automatic_batches(14000, 1, true, 3 << 20), 1);
+  EXPECT_EQ(automatic_batches(35000, 1, true, 3 << 20), 18);
+  EXPECT_EQ(automatic_batches(35000, 2, true, 3 << 20), 18);
+}
+
+TEST(ThirdCache, APartOfItUpToABound) {
+  EXPECT_EQ(ordered_cache_of(8 << 20), 3 << 20);
+  EXPECT_EQ(ordered_cache_of(24 << 20), 9 << 20);
+  EXPECT_EQ(ordered_cache_of(32 << 20), 12 << 20);
+  EXPECT_EQ(ordered_cache_of(256 << 20), 12 << 20);
+  EXPECT_EQ(ordered_cache_of(0), 12 << 20);
+  EXPECT_GT(ordered_cache(), 0.0);
+  EXPECT_LE(ordered_cache(), 12 << 20);
+}
+
+TEST(ThirdCache, SizesAsTheKernelWritesThem) {
+  EXPECT_EQ(cache_size("8192K"), 8 << 20);
+  EXPECT_EQ(cache_size("32M"), 32 << 20);
+  EXPECT_EQ(cache_size("512"), 512);
+  for (const char* no_size : {"", "K", "-1K", "8192 K", "8192KB", "much"}) EXPECT_EQ(cache_size(no_size), 0.0) << no_size;
 }
 
 TEST(AutomaticBatches, EvenWork) {

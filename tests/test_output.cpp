@@ -155,6 +155,7 @@ TEST_F(Output, SummaryHasTheAgreedKeysAndLeavesOutWhatHasNoMeaning) {
   EXPECT_EQ(summary.at("state_hash"), "0000000000000abc");
   EXPECT_EQ(summary.at("exit_code"), 0);
   EXPECT_EQ(summary.at("performance").at("particle_steps_per_second"), 32000.0);
+  EXPECT_EQ(summary.at("performance").at("reproducible"), true);
   const Json& settle = summary.at("stages").at(0);
   EXPECT_EQ(settle.at("name"), "settle");
   EXPECT_EQ(settle.at("kind"), "settle");

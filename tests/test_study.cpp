@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <random>
 #include <thread>
 #include <vector>
@@ -374,6 +375,46 @@ TEST(Study, EndToEndAndKilledAtRandomPoints) {
   const ProgramResult last = run_program(study.words("killed"));
   ASSERT_EQ(last.exit_code, 0) << last.report();
   EXPECT_EQ(tables_of(study.folder / "killed"), expected);
+}
+
+TEST(Study, ReproducibleOnesTakeNoOtherRuns) {
+  const StudyFolder study(study_text, base_text);
+  const fs::path folder = study.folder / "out", run = folder / "runs/tiny-R2.5mm-s1";
+  const auto reproducible = [&] { return nlohmann::json::parse(read_file(run / "summary.json"))["performance"]["reproducible"].get<bool>(); };
+  const auto of_results = [&] { return Hdf5File::open(run / "results.h5").root().integer_attribute("provenance", "reproducible", -1); };
+  ASSERT_EQ(run_program(study.words("out")).exit_code, 0);
+  EXPECT_FALSE(reproducible());
+  EXPECT_EQ(of_results(), 0);
+  const auto done = [&](const std::vector<std::string>& more) { return run_program(study.words("out", more)).out.find(", done") != std::string::npos; };
+  EXPECT_TRUE(done({"--dry-run"}));
+  EXPECT_FALSE(done({"--dry-run", "--reproducible"}));
+  const ProgramResult exact = run_program(study.words("out", {"--reproducible"}));
+  ASSERT_EQ(exact.exit_code, 0) << exact.report();
+  EXPECT_TRUE(reproducible());
+  EXPECT_EQ(of_results(), 1);
+  // With and without the option these are taken as they are, and another instruction set makes the same.
+  const auto before = fs::last_write_time(run / "summary.json");
+  const std::string tables = tables_of(folder);
+  EXPECT_EQ(run_program(study.words("out", {"--reproducible"})).exit_code, 0);
+  EXPECT_EQ(run_program(study.words("out")).exit_code, 0);
+  EXPECT_EQ(fs::last_write_time(run / "summary.json"), before);
+  ProgramOptions scalar;
+  scalar.environment = {{"PLATEN_ISA", "scalar"}};
+  const ProgramResult other = run_program(study.words("scalar", {"--reproducible"}), scalar);
+  ASSERT_EQ(other.exit_code, 0) << other.report();
+  EXPECT_EQ(tables_of(study.folder / "scalar"), tables);
+
+  // Interrupted, one that was made without it begins anew; one that was made with it goes on, and stays what it is.
+  for (const bool with : {false, true}) {
+    fs::remove_all(run);
+    std::vector<std::string> words{"run", (folder / "cases/tiny-R2.5mm-s1.toml").string(), "-o", run.string(), "--stop-after", "settle", "--threads", "1"};
+    if (with) words.push_back("--reproducible");
+    ASSERT_EQ(run_program(words).exit_code, 0);
+    EXPECT_EQ(run_program(study.words("out", with ? std::vector<std::string>{} : std::vector<std::string>{"--reproducible"})).exit_code, 0);
+    EXPECT_TRUE(reproducible()) << with;
+    EXPECT_EQ(read_file(run / "log.jsonl").find("\"resume\"") != std::string::npos, with);
+    EXPECT_EQ(tables_of(folder), tables);
+  }
 }
 
 TEST(Study, KilledInItsFirstMomentItGoesOn) {

@@ -138,6 +138,7 @@ void write_provenance(Hdf5Group group, const RunInfo& info, const std::string& s
   group.attribute("seed", info.seed);
   group.attribute("threads", static_cast<std::int64_t>(info.threads));
   group.attribute("instruction_set", info.instruction_set);
+  group.attribute("reproducible", static_cast<std::int64_t>(info.reproducible));
   group.attribute("scene", info.scene);
   group.attribute("start_time", start_time);
   group.attribute("host", host);

@@ -87,6 +87,7 @@ std::string summary_json(int exit_code, std::optional<std::uint64_t> state_hash,
   Json& figures = summary["performance"];
   figures = {{"threads", performance.threads},
              {"instruction_set", performance.instruction_set},
+             {"reproducible", performance.reproducible},
              {"scene", performance.scene},
              {"particle_steps", performance.particle_steps},
              {"wall_seconds", performance.wall_seconds},

@@ -28,6 +28,7 @@ struct Job {
   double weight = 0.0;  // expected cost in particle-steps
   bool timed = false;
   int threads = 1;
+  bool reproducible = false;  // its run and its tries are made with --reproducible; finished ones that were not do not count
 };
 
 // One curve: one point of the product of a [[curve]], with a run for every seed (timed: and repetition).

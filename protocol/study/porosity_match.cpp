@@ -63,21 +63,23 @@ bool holds_case(const fs::path& folder, const Case& c) {
   return fs::is_regular_file(folder / "case.toml", ignored) && read_whole_file(folder / "case.toml") == c.text;
 }
 
-// The settled porosity of a run folder that holds this case, also of a run that is under way.
-std::optional<double> porosity_in(const fs::path& folder, const Case& c) try {
+// The settled porosity of a run folder that holds this case, also of a run that is under way; not of one that should be reproducible and is not.
+std::optional<double> porosity_in(const fs::path& folder, const Case& c, bool reproducible) try {
   std::error_code ignored;
   if (!holds_case(folder, c) || !fs::is_regular_file(folder / "results.h5", ignored)) return std::nullopt;
-  return settled_porosity(Hdf5File::open(folder / "results.h5").root(), c);
+  const Hdf5Group results = Hdf5File::open(folder / "results.h5").root();
+  if (reproducible && (!results.has("provenance") || results.integer_attribute("provenance", "reproducible", 0) == 0)) return std::nullopt;
+  return settled_porosity(results, c);
 } catch (const OutputError&) {
   return std::nullopt;  // a run that begins anew has just removed its files
 }
 
 // Growth gives up before the first stage on a bed that is too dense for it; every other failure is not an answer.
-bool too_dense_to_grow(const PorosityMatch& match, const fs::path& folder, const Case& c) {
+bool too_dense_to_grow(const PorosityMatch& match, const fs::path& folder, const Case& c, bool reproducible) {
   std::error_code ignored;
   if (vibrates(match) || !holds_case(folder, c) || !fs::is_regular_file(folder / "summary.json", ignored)) return false;
   const nlohmann::json summary = nlohmann::json::parse(read_whole_file(folder / "summary.json"), nullptr, false);
-  return summary.is_object() && summary.value("exit_code", 0) == exit_numerical &&
+  return summary.is_object() && summary.value("exit_code", 0) == exit_numerical && (!reproducible || made_reproducibly(summary)) &&
          summary.value("stages", nlohmann::json::array()).empty();
 }
 
@@ -169,7 +171,7 @@ MatchState match_state(const StudyPlan& plan, const Job& job, const fs::path& st
   const Case& start = job.match->start;
   const Job& reference = plan.jobs[job.match->reference];
   MatchState state;
-  state.target = porosity_in(run_folder(study_folder, reference), reference.c);
+  state.target = porosity_in(run_folder(study_folder, reference), reference.c, reference.reproducible);
   if (!state.target) return state;
   const PorosityKnob knob = knob_of(match, start);
   const PorosityAim aim{*state.target, match.tolerance, match.most_tries};
@@ -185,8 +187,8 @@ MatchState match_state(const StudyPlan& plan, const Job& job, const fs::path& st
     state.kind = step.kind == SearchStep::Kind::met ? MatchState::Kind::met : MatchState::Kind::attempt;
     if (state.kind == MatchState::Kind::met) return state;
     const fs::path folder = try_folder(study_folder, job, state.tries.size() + 1);
-    const std::optional<double> porosity = porosity_in(folder, state.c);
-    if (!porosity && !too_dense_to_grow(match, folder, state.c)) return state;
+    const std::optional<double> porosity = porosity_in(folder, state.c, job.reproducible);
+    if (!porosity && !too_dense_to_grow(match, folder, state.c, job.reproducible)) return state;
     state.tries.push_back({step.knob, porosity});
   }
 }

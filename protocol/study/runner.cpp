@@ -34,9 +34,9 @@ using Clock = std::chrono::steady_clock;
 
 double since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
-// Whether an interrupted run of this very case has left all that `resume` needs. What else may keep that from going on (a full
+// Whether an interrupted run of this very case has left all that `resume` needs, and was made as wanted. What else may keep that from going on (a full
 // disk, somebody else at work there) passes, so the run is not given up for it.
-bool can_go_on(const fs::path& folder, const std::string& case_text) {
+bool can_go_on(const fs::path& folder, const std::string& case_text, bool reproducible) {
   try {
     if (!fs::exists(folder / "case.toml") || read_whole_file(folder / "case.toml") != case_text) return false;
     std::string passed_over;
@@ -46,7 +46,7 @@ bool can_go_on(const fs::path& folder, const std::string& case_text) {
     const bool kernels = from.reproducible || std::any_of(sets.begin(), sets.end(), [&](InstructionSet set) { return to_string(set) == from.instruction_set; });
     read_series(folder / "series.csv", facts.rows);
     if (!facts.closed.empty()) Hdf5File::open(folder / "results.h5");
-    return kernels && from.case_text == case_text;
+    return kernels && from.case_text == case_text && (from.reproducible || !reproducible);
   } catch (const std::exception&) {
     return false;
   }
@@ -114,6 +114,22 @@ pid_t start(const fs::path& program, const std::vector<std::string>& words, cons
   for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGXCPU, SIGPIPE, SIGXFSZ, SIGUSR1}) ::signal(number, SIG_DFL);
   ::execv(program.c_str(), argv.data());
   ::_exit(127);
+}
+
+// The summary of a run that has finished well; null where there is none.
+nlohmann::json finished_summary(const fs::path& folder) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(folder / "summary.json", ignored)) return {};
+  nlohmann::json summary = nlohmann::json::parse(text_of(folder / "summary.json"), nullptr, false);
+  const auto code = summary.is_object() ? summary.find("exit_code") : summary.end();
+  if (!summary.is_object() || code == summary.end() || *code != 0) return {};
+  return summary;
+}
+
+bool is_as_wanted(const fs::path& folder, const nlohmann::json& summary, const Job& job) {
+  if (text_of(folder / "case.toml") != job.c.text) return false;
+  const bool reproducible = made_reproducibly(summary);
+  return job.timed ? reproducible == job.reproducible : reproducible || !job.reproducible;  // times of two kinds of kernels do not compare
 }
 
 // Warnings of all stages of a run, for one cell of a table.
@@ -242,11 +258,12 @@ class Runner {
     write_whole_file(file, c.text);
     wait_until_free(folder);
     std::vector<std::string> words{"platen"};
-    const bool resumed = attempt == 0 && !job.timed && can_go_on(folder, c.text);
+    const bool resumed = attempt == 0 && !job.timed && can_go_on(folder, c.text, job.reproducible);
     if (resumed)
       words.insert(words.end(), {"resume", folder.string()});
     else
       words.insert(words.end(), {"run", file.string(), "-o", folder.string(), "--force"});
+    if (!resumed && job.reproducible) words.push_back("--reproducible");
     words.insert(words.end(), {"--threads", std::to_string(job.threads), "--quiet", "--no-report"});
     if (attempt > 0) words.insert(words.end(), {"--stop-after", settled_stage(c)->name});
     outcomes_[k].state = JobState::running;
@@ -396,23 +413,23 @@ class Runner {
 
 fs::path run_folder(const fs::path& study_folder, const Job& job) { return study_folder / "runs" / job.name; }
 
+bool made_reproducibly(const nlohmann::json& summary) {
+  const auto figures = summary.find("performance");
+  if (figures == summary.end() || !figures->is_object()) return false;
+  const auto said = figures->find("reproducible");
+  return said != figures->end() && *said == true;
+}
+
 bool is_done(const fs::path& study_folder, const Job& job) {
   if (job.match && !job.match->met) return false;
-  const fs::path folder = run_folder(study_folder, job);
-  std::error_code ignored;
-  if (!fs::is_regular_file(folder / "summary.json", ignored) || text_of(folder / "case.toml") != job.c.text)
-    return false;
-  const nlohmann::json summary = nlohmann::json::parse(text_of(folder / "summary.json"), nullptr, false);
-  return summary.is_object() && summary.contains("exit_code") && summary["exit_code"] == 0;
+  const nlohmann::json summary = finished_summary(run_folder(study_folder, job));
+  return !summary.is_null() && is_as_wanted(run_folder(study_folder, job), summary, job);
 }
 
 bool holds_another(const fs::path& study_folder, const Job& job) {
   if (job.match && !job.match->met) return false;  // its case is not known yet
-  const fs::path folder = run_folder(study_folder, job);
-  std::error_code ignored;
-  if (!fs::is_regular_file(folder / "summary.json", ignored) || text_of(folder / "case.toml") == job.c.text) return false;
-  const nlohmann::json summary = nlohmann::json::parse(text_of(folder / "summary.json"), nullptr, false);
-  return summary.is_object() && summary.value("exit_code", -1) == 0;
+  const nlohmann::json summary = finished_summary(run_folder(study_folder, job));
+  return !summary.is_null() && !is_as_wanted(run_folder(study_folder, job), summary, job);
 }
 
 std::vector<JobOutcome> run_jobs(StudyPlan& plan, const RunnerOptions& options) {

@@ -12,6 +12,7 @@
 #include <atomic>
 #include <filesystem>
 #include <functional>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -50,9 +51,11 @@ struct RunnerOptions {
 
 std::filesystem::path run_folder(const std::filesystem::path& study_folder, const Job& job);
 
-// Whether the folder of the job holds its finished run. Of a matched job only once its case is known (take_match).
+// Whether a run was made with --reproducible, by its summary.json.
+bool made_reproducibly(const nlohmann::json& summary);
+// Whether the folder of the job holds its finished run, made with --reproducible where that is wanted (timed: only there). Of a matched job only once its case is known (take_match).
 bool is_done(const std::filesystem::path& study_folder, const Job& job);
-// Whether the job's folder holds a finished run of another case, which the job replaces.
+// Whether the job's folder holds a finished run of another case, or one made without --reproducible where it is wanted, which the job replaces.
 bool holds_another(const std::filesystem::path& study_folder, const Job& job);
 
 // One outcome a job; matched jobs get their cases. A failing job does not end the others. Throws OutputError where the study's own files cannot be
