@@ -42,7 +42,7 @@ def make(folder):
         lines = []
         for r in rows:
             asked = ASKED.get(r["particles"], (None, None))
-            asked = asked[r["threads"] - 1] if r["threads"] <= 2 else None
+            asked = asked[r["threads"] - 1] if r["threads"] <= 2 and r["set"] == "avx512" else None
             lines.append((f"{r['particles']:,}", r["threads"], number(r["rate"]), "-" if asked is None else asked, number(r["best"]),
                           number(r.get("ns")), number(r["Z"], 2), number(r.get("memory"), 0), r["rebuilds"], state(r)))
         parts.append(f"### Whole step, scene `full`, {rows[0]['set']}\n\n" + table(

@@ -119,7 +119,7 @@ void add_notes(const Case& c, CheckReport& report) {
                                        100.0 * f.mass_max / f.mass_total));
   for (const InertialNumber& i : report.inertial)
     if (i.value > 1e-3)
-      report.notes.push_back(fmt::format("{}: inertial number {:.1e} at {} ({}): above 1e-3, not quasi-static there (it is below 1e-4)",
+      report.notes.push_back(fmt::format("{}: inertial number {:.1e} at {} ({}): above 1e-3: not quasi-static there (below 1e-4 would be)",
                                          i.stage, i.value, pretty(i.stress, "Pa"), i.of));
 }
 

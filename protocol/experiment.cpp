@@ -56,6 +56,7 @@ RunOutcome Experiment::run() {
       failed.end_reason = "failed";
       failed.reached = false;
       failed.last_step = sim_->step(), failed.time_end = sim_->time();
+      failed.wall_seconds = wall_clock() - stage_begun_;
       if (stage_open_) closed_.push_back(failed);
     }
     folder_.log("failed", {{"message", outcome.message}}, LogLevel::error);
@@ -143,6 +144,7 @@ Experiment::End Experiment::run_stage(std::size_t index, bool on_the_way) {
   Stand stand{*sim_, c_, spec, sim_->step(), sim_->time(), strain_zero_height_, sim_->step(), 0.0};
   Stage stage = make_stage(spec);
   Course course = on_the_way ? go_on_with_stage(stand, stage) : begin_stage(index, stand, stage);
+  stage_begun_ = course.begun;
   const double speed = spec.speed, stage_begin = course.begun, residual_before = course.residual_before, dissipated_before = course.dissipated_before;
   std::int64_t& next_sample = course.next_sample;
 
@@ -198,7 +200,8 @@ Experiment::End Experiment::run_stage(std::size_t index, bool on_the_way) {
     sim_->advance(target - sim_->step());
     show_progress(index, stand, exact, stage_begin);
     stop_ = stop_request();
-    if (stop_ || checkpoint_is_due()) keep_within(index, stand, stage, course);
+    // Before the look that may find the goal missed: `resume` goes on from here once the stage may last longer.
+    if (stop_ || checkpoint_is_due() || (sim_->step() >= longest && !(exact && sim_->step() >= *exact))) keep_within(index, stand, stage, course);
   }
 
   sample(index, speed);
@@ -207,6 +210,9 @@ Experiment::End Experiment::run_stage(std::size_t index, bool on_the_way) {
   if (spec.kind == StageKind::hold && end != End::stopped && std::fabs(m.stress_top - spec.stress) > 0.02 * spec.stress)
     warn(!m.top_touches ? "the top plate has not come to the bed: `compress` before it, or a longer duration"
                         : fmt::format("the stress at its end is {}, not {}: a longer duration lets it settle", pretty(m.stress_top, "Pa"), pretty(spec.stress, "Pa")));
+  if ((spec.kind == StageKind::compress || spec.kind == StageKind::crush) && end == End::done && spec.until.stress && m.stress_top > 1.1 * *spec.until.stress)
+    warn(fmt::format("the stress has gone {:.0f} % past its goal of {} between two looks: a lower speed or a smaller engine.check_every comes nearer",
+                     100.0 * (m.stress_top / *spec.until.stress - 1.0), pretty(*spec.until.stress, "Pa")));
   const double dissipated = m.ledger.dissipated();
   current_.residual_share = !c_.output.energy ? std::numeric_limits<double>::quiet_NaN() : (m.energy_residual - residual_before) / std::max(dissipated - dissipated_before, 0.01 * dissipated);
   if (std::fabs(current_.residual_share) > 0.01) warn(fmt::format("the energy ledger is open by {:.2g} % of what was dissipated; a smaller time step closes it", 100.0 * std::fabs(current_.residual_share)));

@@ -96,6 +96,7 @@ class Experiment {
   const Checkpoint* from_;                   // null: from the start
   nlohmann::json kept_;                      // its account of the stages
   double process_begin_, wall_begin_;        // of this process, and as if the whole run were its work [s]
+  double stage_begun_ = 0.0;                 // wall clock [s]
   double wall_seconds_ = 0.0;                // so far, as a checkpoint has it
   double kept_at_, keeping_takes_ = 0.0;     // when the last checkpoint was written, and for how long
   int checkpoints_asked_ = 0;

@@ -122,6 +122,10 @@ Command add_resume(CLI::App& program) {
   auto walltime = std::make_shared<std::string>();
   app->add_option("DIR", command->folder, "run folder")->type_name("DIR")->required();
   add_threads(*app, command->threads);
+  app->add_option("--set", command->overrides, "give a stage that is not over more time: stage.NAME.max_duration=T. May be repeated")
+      ->type_name("KEY.PATH=VALUE")
+      ->take_all()
+      ->allow_extra_args(false);
   app->add_option("--max-walltime", *walltime, "stop after this time, e.g. \"90 s\", \"10 min\", \"2 h\"")->type_name("T");
   app->add_option("--stop-after", command->stop_after, "end after this stage, by name or number")->type_name("STAGE");
   app->add_flag_callback("--no-report", [command] { command->report = false; }, "write no report.html");
@@ -243,7 +247,8 @@ std::optional<std::string> unknown_option(const CLI::App& app, int argc, char** 
     const std::string word = argv[k], name = word.substr(0, word.find('='));
     if (word == "--") break;
     if (!word.starts_with("--") || std::find(known.begin(), known.end(), name) != known.end()) continue;
-    const std::string nearest = nearest_word(name, known);
+    std::string nearest = nearest_word(name, known);
+    if (nearest == "--help" && !name.starts_with("--h")) nearest.clear();
     return fmt::format("there is no option {}{}", name, nearest.empty() ? "" : "; did you mean " + nearest + "?");
   }
   return std::nullopt;

@@ -26,6 +26,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// "1 sphere", "2 spheres".
+template <class Number>
+std::string counted(Number n, const char* what) {
+  return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s");
+}
+
 void print(const std::string& text) { std::fwrite(text.data(), 1, text.size(), stdout); }
 
 // What the user should know beside the table: why the run did not simply end.
@@ -38,7 +44,12 @@ void report_end(const RunOutcome& outcome, const fs::path& folder, bool quiet) {
       else if (!quiet)
         spdlog::warn("{}; what there is so far: {}; `platen resume {}` goes on", outcome.message, folder.string(), folder.string());
       break;
-    default: spdlog::error("{}; what there is so far: {}", outcome.message, folder.string());
+    default: {
+      std::string how;
+      if (outcome.exit_code == exit_goal && has_checkpoint(folder))
+        how = fmt::format("; `platen resume {} --set stage.{}.max_duration=...` goes on with a longer one", folder.string(), outcome.stages.back().name);
+      spdlog::error("{}; what there is so far: {}{}", outcome.message, folder.string(), how);
+    }
   }
 }
 
@@ -149,6 +160,20 @@ RunOptions options_from(const Checkpoint& from, const CheckpointFacts& facts, co
   return options;
 }
 
+// The case of a run that goes on, with more time for stages that are not over: all that may change.
+Case with_more_time(const Case& c, const CheckpointFacts& facts, const ResumeCommand& command) {
+  for (const std::string& text : command.overrides) {
+    const std::string key = text.substr(0, text.find('='));
+    if (!key.starts_with("stage.") || !key.ends_with(".max_duration"))
+      throw UsageError(fmt::format("--set: {} stays as it is in a run that goes on; allowed: stage.NAME.max_duration, or a new run", key));
+  }
+  Case longer = read_case(command.folder / "case.toml", command.overrides, CaseUse::resume);
+  for (std::size_t k = 0; k < facts.stage && k < c.stages.size(); ++k)
+    if (longer.stages[k].max_duration != c.stages[k].max_duration)
+      throw UsageError(fmt::format("--set: stage \"{}\" is over; allowed: stages from \"{}\" on", c.stages[k].name, c.stages[std::min(facts.stage, c.stages.size() - 1)].name));
+  return longer;
+}
+
 int say_done(const ResumeCommand& command) {
   if (command.json) print(read_whole_file(command.folder / "summary.json"));
   else if (!command.quiet) spdlog::info("{}: {}; nothing is left to do", command.folder.string(), run_state(command.folder).text);
@@ -185,8 +210,8 @@ int branch_command(const RunCommand& command) {
   RunFolder folder = RunFolder::reopen(std::move(held), path, facts.rows, facts.closed, facts.frames, start);
   if (!passed_over.empty()) spdlog::warn("{}; going on from the checkpoint before it", passed_over);
   if (!command.quiet)
-    spdlog::info("{}: {} spheres, from {} after stage {}, {} of {} stages are left, {} thread{}, into {}", command.case_file.filename().string(), from.bed.id.size(), of.string(),
-                 c.stages[facts.stage - 1].name, c.stages.size() - facts.stage, c.stages.size(), options.threads, options.threads == 1 ? "" : "s", path.string());
+    spdlog::info("{}: {}, from {} after stage {}, {} of {} stages are left, {}, into {}", command.case_file.filename().string(), counted(from.bed.id.size(), "sphere"), of.string(),
+                 c.stages[facts.stage - 1].name, c.stages.size() - facts.stage, c.stages.size(), counted(options.threads, "thread"), path.string());
   folder.log("from", {{"run", of.string()}, {"step", from.bed.step}, {"after", c.stages[facts.stage - 1].name}});
   Course course{c, folder, options, &from, true, command.report, command.json, command.quiet};
   return carry_out(course);
@@ -209,8 +234,8 @@ int run_command(const RunCommand& command) {
   catch_stop_signals(command.quiet);  // before anything is begun that should be ended in good order
   RunFolder folder = RunFolder::create(path, c.text, command.force);
   if (!command.quiet)
-    spdlog::info("{}: {} spheres, {} stages, {} thread{}, into {}", command.case_file.filename().string(), c.particles.count,
-                 c.stages.size(), options.threads, options.threads == 1 ? "" : "s", path.string());
+    spdlog::info("{}: {}, {}, {}, into {}", command.case_file.filename().string(), counted(c.particles.count, "sphere"),
+                 counted(c.stages.size(), "stage"), counted(options.threads, "thread"), path.string());
   Course course{c, folder, options, nullptr, true, command.report, command.json, command.quiet};
   return carry_out(course);
 }
@@ -220,22 +245,28 @@ int resume_command(const ResumeCommand& command) {
   if (!fs::exists(path / "case.toml") || !fs::exists(path / "series.csv")) throw OutputError(path.string() + ": is not a run folder");
   // In hand before anything is read: whoever is still at work there writes the last checkpoint first.
   UniqueFd held = RunFolder::hold(path);
-  const Case c = read_case(path / "case.toml", {}, CaseUse::resume);
+  Case c = read_case(path / "case.toml", {}, CaseUse::resume);
   if (!has_checkpoint(path) && all_stages_done(path, c)) return say_done(command);
   std::string passed_over;
-  const Checkpoint from = newest_checkpoint(path, passed_over);
+  Checkpoint from = newest_checkpoint(path, passed_over);
   if (c.text != from.case_text)
     throw CaseError(fmt::format("{}: is not the case that the run was begun with; put that back (dataset /case of the checkpoint has it), or begin anew with `platen run`", (path / "case.toml").string()));
   const CheckpointFacts facts = facts_of(from);
   if (!facts.within && facts.stage >= c.stages.size() && all_stages_done(path, c)) return say_done(command);  // kept by --stop-after, for `run --from`
   const RunOptions options = options_from(from, facts, c, command, "the run");
+  if (!command.overrides.empty()) c = with_more_time(c, facts, command);
   catch_stop_signals(command.quiet);
   make_simulation(c, from, 1);  // fails before the folder is touched, if it does
+  if (c.text != from.case_text) {
+    from.case_text = c.text;
+    write_checkpoint(path, from);
+    write_whole_file(path / "case.toml", c.text);
+  }
   RunFolder folder = RunFolder::reopen(std::move(held), path, facts.rows, facts.closed, facts.frames, from.start_time);
   if (!passed_over.empty()) spdlog::warn("{}; going on from the checkpoint before it", passed_over);
   if (!command.quiet)
-    spdlog::info("{}: {} spheres, on from step {}, {:.4g} s simulated, {} thread{}", path.string(), from.bed.id.size(), from.bed.step,
-                 from.bed.time_base + static_cast<double>(from.bed.step - from.bed.step_base) * from.bed.dt, options.threads, options.threads == 1 ? "" : "s");
+    spdlog::info("{}: {}, on from step {}, {:.4g} s simulated, {}", path.string(), counted(from.bed.id.size(), "sphere"), from.bed.step,
+                 from.bed.time_base + static_cast<double>(from.bed.step - from.bed.step_base) * from.bed.dt, counted(options.threads, "thread"));
   Course course{c, folder, options, &from, false, command.report, command.json, command.quiet};
   return carry_out(course);
 }

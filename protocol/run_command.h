@@ -39,6 +39,7 @@ int run_command(const RunCommand& command);
 
 struct ResumeCommand {
   std::filesystem::path folder;
+  std::vector<std::string> overrides;   // --set: max_duration of stages that are not over
   std::optional<int> threads;           // default: usable_cores()
   std::optional<double> max_walltime;   // [s]
   std::string stop_after;

@@ -41,7 +41,7 @@ std::string plan_table(const StudyPlan& plan, const fs::path& folder) {
   for (Job job : plan.jobs) {
     if (job.match) take_match(job, match_state(plan, job, folder));
     out += fmt::format("{:<60} {:>8} spheres{}{}{}\n", job.name, job.c.particles.count, job.timed ? ", timed" : "",
-                       job.match ? ", as porous as " + plan.jobs[job.match->reference].name : "", is_done(folder, job) ? ", done" : "");
+                       job.match ? ", as porous as " + plan.jobs[job.match->reference].name : "", is_done(folder, job) ? ", done" : holds_another(folder, job) ? ", to be made anew" : "");
   }
   return out;
 }

@@ -336,6 +336,35 @@ TEST(ResumeCommand, StopAfter) {
   EXPECT_EQ(result.exit_code, 5) << result.report();
 }
 
+// A stage that misses its goal keeps all that it takes to go on: given more time, the run ends as if it had had that from the start.
+TEST(ResumeCommand, AMissedGoalGoesOnWithMoreTime) {
+  TemporaryFolder root;
+  write_file(root / "case.toml", small_bed + "frames = \"5 ms\"\n" + fill + quick_settle + press + unload);
+  const fs::path run = root / "run";
+  const auto from_start = [&](const fs::path& folder, const std::string& longest) {
+    return run_program({"run", (root / "case.toml").string(), "-o", folder.string(), "--no-report", "--set", "stage.compress.max_duration=" + longest});
+  };
+  ASSERT_EQ(from_start(root / "whole", "60.5").exit_code, 0);
+  // Between two looks, at none that is on the grid.
+  ProgramResult result = from_start(run, "0.02007");
+  EXPECT_EQ(result.exit_code, 6) << result.report();
+  EXPECT_TRUE(has(result.err, "`platen resume " + run.string() + " --set stage.compress.max_duration=...` goes on with a longer one")) << result.err;
+  EXPECT_EQ(run_program({"resume", run.string(), "--no-report"}).exit_code, 6) << "as it is, it misses the goal again";
+  const auto with = [&](const std::string& change) { return run_program({"resume", run.string(), "--no-report", "--set", change}); };
+  result = with("stage.compress.speed=0.1");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_TRUE(has(result.err, "--set: stage.compress.speed stays as it is in a run that goes on; allowed: stage.NAME.max_duration, or a new run")) << result.err;
+  result = with("stage.settle.max_duration=70");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_TRUE(has(result.err, "--set: stage \"settle\" is over; allowed: stages from \"compress\" on")) << result.err;
+  EXPECT_EQ(with("stage.compress.max_duration=-1").exit_code, 3);
+  EXPECT_EQ(with("stage.compress.max_duration=0.03").exit_code, 6) << "once more, since it was not enough";
+  result = with("stage.compress.max_duration=60.5");
+  EXPECT_EQ(result.exit_code, 0) << result.report();
+  expect_same_run(root / "whole", run);
+  EXPECT_EQ(read_file(root / "whole/case.toml"), read_file(run / "case.toml"));
+}
+
 TEST(ResumeCommand, ACheckpointThatCannotBeWrittenIsAWarning) {
   TemporaryFolder root;
   write_file(root / "case.toml", small_bed + fill + quick_settle);

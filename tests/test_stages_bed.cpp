@@ -40,6 +40,13 @@ TEST(Fill, RainGivesALooseBedWhoseSpheresHaveAllLanded) {
   }
 }
 
+TEST(Fill, SpheresThatTouchNoOtherHaveLandedToo) {
+  const Trial run = run_case(small_bed + fill, {"particles.count=3", "box.width=\"60 mm\"", "box.depth=\"60 mm\"", "particles.law.k_adh=0"});
+  ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
+  EXPECT_EQ(run.stage("fill").last.measures.contacts, 0);
+  EXPECT_LT(run.stage("fill").last.measures.time, 2.0);
+}
+
 const std::string slow_rain = "[[stage]]\nkind = \"fill\"\nduration = \"0.6 s\"\noutlet = \"60 mm\"\n";
 constexpr double outlet = 0.06, drop_speed = 0.5;
 

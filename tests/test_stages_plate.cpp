@@ -40,6 +40,17 @@ TEST(Compress, EndsAtTheFirstLookAtItsStress) {
   EXPECT_EQ(run.stage("compress").end_reason, "stress 20 kPa reached");
 }
 
+TEST(Compress, AGoalThatIsFarBehindAtTheFirstLookIsTold) {
+  const Trial run = run_case(small_bed + fill + quick_settle + press, {"stage.compress.speed=2", "engine.check_every=128"});
+  ASSERT_EQ(run.outcome.exit_code, exit_done) << run.outcome.message;
+  const auto tells = [](const StageResult& stage) {
+    return std::any_of(stage.warnings.begin(), stage.warnings.end(), [](const std::string& w) { return w.find("% past its goal of 20 kPa between two looks") != std::string::npos; });
+  };
+  EXPECT_GT(run.stage("compress").last.measures.stress_top, 22e3);
+  EXPECT_TRUE(tells(run.stage("compress")));
+  EXPECT_FALSE(tells(protocol_run().stage("compress")));
+}
+
 TEST(Compress, StrainCountsFromItsZero) {
   const Trial& run = protocol_run();
   const auto rows = run.rows("compress");

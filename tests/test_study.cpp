@@ -489,6 +489,11 @@ TEST(Study, CommandLine) {
   EXPECT_EQ(dry.exit_code, 0);
   EXPECT_NE(dry.out.find("tiny-R3mm-a2-b2-s1"), std::string::npos) << dry.report();
   EXPECT_FALSE(fs::exists(study.folder / "a"));
+  fs::create_directories(study.folder / "of-a-study");
+  write_file(study.folder / "of-a-study/study.toml", study_text);
+  const ProgramResult over_it = run_program({"run", (study.folder / "tiny.toml").string(), "-o", (study.folder / "of-a-study").string(), "--force"});
+  EXPECT_EQ(over_it.exit_code, 5);
+  EXPECT_NE(over_it.err.find("is the folder of a study; choose another folder"), std::string::npos) << over_it.report();
   fs::create_directories(study.folder / "mine");
   write_file(study.folder / "mine" / "thesis.txt", "years of work");
   const ProgramResult foreign = run_program(study.words("mine"));

@@ -126,7 +126,6 @@ std::optional<std::string> FillStage::done(Stand& stand, const Look& look) {
 // What still moves is a thousandth of the energy of position, and the bottom carries all.
 bool FillStage::landed(const Stand& stand, const Measures& m) const {
   if (in_outlet > 0) return false;
-  if (m.contacts == 0 && stand.sim.particles() > 1) return false;
   if (!(m.kinetic_energy <= 1e-3 * m.potential_energy && std::fabs(m.support_force - m.weight) <= 0.1 * m.weight)) return false;
   // In a large bed neither would notice a few late ones: none may be faster than from a fall by its own radius.
   const Particles& p = stand.sim.state();

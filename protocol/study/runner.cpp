@@ -378,7 +378,7 @@ class Runner {
     p.failed = failed_;
     p.running = children_.size();
     p.wall_seconds = since(begin_);
-    p.newest = newest_;
+    p.newest = children_.empty() ? newest_ : title(children_.back().job, children_.back().attempt, " try ");  // one that is at work
     look_at_children();
     // Guesses are off alike: what the finished runs took instead of theirs holds for the others too.
     const double stretch = done_weight_ > 0.0 ? done_steps_ / done_weight_ : 1.0;
