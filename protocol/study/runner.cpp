@@ -423,7 +423,8 @@ bool made_reproducibly(const nlohmann::json& summary) {
 bool is_done(const fs::path& study_folder, const Job& job) {
   if (job.match && !job.match->met) return false;
   const nlohmann::json summary = finished_summary(run_folder(study_folder, job));
-  return !summary.is_null() && is_as_wanted(run_folder(study_folder, job), summary, job);
+  // One that somebody told where to stop is not over.
+  return !summary.is_null() && summary.value("stages", nlohmann::json::array()).size() >= job.c.stages.size() && is_as_wanted(run_folder(study_folder, job), summary, job);
 }
 
 bool holds_another(const fs::path& study_folder, const Job& job) {
