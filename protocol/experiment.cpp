@@ -120,7 +120,7 @@ std::optional<std::string> Experiment::stop_request() const {
 Experiment::Course Experiment::begin_stage(std::size_t index, Stand& stand, Stage& stage) {
   const StageSpec& spec = c_.stages[index];
   Course course;
-  course.begun = wall_clock();
+  course.begun = stage_begun_ = wall_clock();
   current_ = StageResult{};
   current_.name = spec.name, current_.kind = spec.kind;
   current_.first_step = sim_->step(), current_.time_begin = sim_->time();
@@ -132,6 +132,7 @@ Experiment::Course Experiment::begin_stage(std::size_t index, Stand& stand, Stag
   strain_zero_height_ = stand.strain_zero_height;
   if (spec.kind == StageKind::crush && sim_->confined()) warn("the sides are still there: its strength is not an unconfined one; a stage `release` takes them away");
   sample(index, spec.speed);
+  course.stress_before = current_.last.measures.stress_top;
   course.residual_before = current_.last.measures.energy_residual, course.dissipated_before = current_.last.measures.ledger.dissipated();
   course.next_sample = next_step_of(c_.output.series);
   if (frame_interval(spec) > 0.0) add_frame();
@@ -210,7 +211,7 @@ Experiment::End Experiment::run_stage(std::size_t index, bool on_the_way) {
   if (spec.kind == StageKind::hold && end != End::stopped && std::fabs(m.stress_top - spec.stress) > 0.02 * spec.stress)
     warn(!m.top_touches ? "the top plate has not come to the bed: `compress` before it, or a longer duration"
                         : fmt::format("the stress at its end is {}, not {}: a longer duration lets it settle", pretty(m.stress_top, "Pa"), pretty(spec.stress, "Pa")));
-  if ((spec.kind == StageKind::compress || spec.kind == StageKind::crush) && end == End::done && spec.until.stress && m.stress_top > 1.1 * *spec.until.stress)
+  if ((spec.kind == StageKind::compress || spec.kind == StageKind::crush) && end == End::done && spec.until.stress && course.stress_before < *spec.until.stress && m.stress_top > 1.1 * *spec.until.stress)
     warn(fmt::format("the stress has gone {:.0f} % past its goal of {} between two looks: a lower speed or a smaller engine.check_every comes nearer",
                      100.0 * (m.stress_top / *spec.until.stress - 1.0), pretty(*spec.until.stress, "Pa")));
   const double dissipated = m.ledger.dissipated();

@@ -31,6 +31,7 @@ class Experiment {
   struct Course {
     double begun = 0.0;  // wall clock [s]
     double residual_before = 0.0, dissipated_before = 0.0;  // [J]
+    double stress_before = 0.0;                             // on the top plate [Pa]
     std::int64_t next_sample = 0, next_frame = 0;
   };
 

@@ -46,7 +46,7 @@ void report_end(const RunOutcome& outcome, const fs::path& folder, bool quiet) {
       break;
     default: {
       std::string how;
-      if (outcome.exit_code == exit_goal && has_checkpoint(folder))
+      if (outcome.exit_code == exit_goal && !quiet && has_checkpoint(folder))
         how = fmt::format("; `platen resume {} --set stage.{}.max_duration=...` goes on with a longer one", folder.string(), outcome.stages.back().name);
       spdlog::error("{}; what there is so far: {}{}", outcome.message, folder.string(), how);
     }
@@ -162,16 +162,24 @@ RunOptions options_from(const Checkpoint& from, const CheckpointFacts& facts, co
 
 // The case of a run that goes on, with more time for stages that are not over: all that may change.
 Case with_more_time(const Case& c, const CheckpointFacts& facts, const ResumeCommand& command) {
+  Case longer = read_case(command.folder / "case.toml", command.overrides, CaseUse::resume);
+  for (std::size_t k = 0; k < c.stages.size(); ++k) {
+    if (k < facts.stage && longer.stages[k].max_duration != c.stages[k].max_duration)
+      throw UsageError(fmt::format("--set: stage \"{}\" is over; allowed: stages from \"{}\" on", c.stages[k].name, c.stages[std::min(facts.stage, c.stages.size() - 1)].name));
+    if (longer.stages[k].max_duration < c.stages[k].max_duration)
+      throw UsageError(fmt::format("--set: stage.{}.max_duration = {:g} s is less than it was; allowed: more than {:g} s", c.stages[k].name, longer.stages[k].max_duration, c.stages[k].max_duration));
+  }
+  return longer;
+}
+
+// Nothing else of a run that goes on may change.
+void refuse_other_keys(const ResumeCommand& command) {
   for (const std::string& text : command.overrides) {
-    const std::string key = text.substr(0, text.find('='));
+    std::string key = text.substr(0, text.find('='));
+    key.erase(key.find_last_not_of(" \t") + 1);
     if (!key.starts_with("stage.") || !key.ends_with(".max_duration"))
       throw UsageError(fmt::format("--set: {} stays as it is in a run that goes on; allowed: stage.NAME.max_duration, or a new run", key));
   }
-  Case longer = read_case(command.folder / "case.toml", command.overrides, CaseUse::resume);
-  for (std::size_t k = 0; k < facts.stage && k < c.stages.size(); ++k)
-    if (longer.stages[k].max_duration != c.stages[k].max_duration)
-      throw UsageError(fmt::format("--set: stage \"{}\" is over; allowed: stages from \"{}\" on", c.stages[k].name, c.stages[std::min(facts.stage, c.stages.size() - 1)].name));
-  return longer;
 }
 
 int say_done(const ResumeCommand& command) {
@@ -242,6 +250,7 @@ int run_command(const RunCommand& command) {
 
 int resume_command(const ResumeCommand& command) {
   const fs::path& path = command.folder;
+  refuse_other_keys(command);
   if (!fs::exists(path / "case.toml") || !fs::exists(path / "series.csv")) throw OutputError(path.string() + ": is not a run folder");
   // In hand before anything is read: whoever is still at work there writes the last checkpoint first.
   UniqueFd held = RunFolder::hold(path);
@@ -259,7 +268,7 @@ int resume_command(const ResumeCommand& command) {
   make_simulation(c, from, 1);  // fails before the folder is touched, if it does
   if (c.text != from.case_text) {
     from.case_text = c.text;
-    write_checkpoint(path, from);
+    for (int k = 0; k < 2; ++k) write_checkpoint(path, from);  // also the one before it
     write_whole_file(path / "case.toml", c.text);
   }
   RunFolder folder = RunFolder::reopen(std::move(held), path, facts.rows, facts.closed, facts.frames, from.start_time);

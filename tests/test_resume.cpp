@@ -358,6 +358,9 @@ TEST(ResumeCommand, AMissedGoalGoesOnWithMoreTime) {
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_TRUE(has(result.err, "--set: stage \"settle\" is over; allowed: stages from \"compress\" on")) << result.err;
   EXPECT_EQ(with("stage.compress.max_duration=-1").exit_code, 3);
+  result = with("stage.compress.max_duration = 0.001");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_TRUE(has(result.err, "stage.compress.max_duration = 0.001 s is less than it was; allowed: more than 0.02007 s")) << result.err;
   EXPECT_EQ(with("stage.compress.max_duration=0.03").exit_code, 6) << "once more, since it was not enough";
   result = with("stage.compress.max_duration=60.5");
   EXPECT_EQ(result.exit_code, 0) << result.report();

@@ -489,7 +489,7 @@ TEST(Study, CommandLine) {
   EXPECT_EQ(dry.exit_code, 0);
   EXPECT_NE(dry.out.find("tiny-R3mm-a2-b2-s1"), std::string::npos) << dry.report();
   EXPECT_FALSE(fs::exists(study.folder / "a"));
-  fs::create_directories(study.folder / "of-a-study");
+  fs::create_directories(study.folder / "of-a-study/runs");
   write_file(study.folder / "of-a-study/study.toml", study_text);
   const ProgramResult over_it = run_program({"run", (study.folder / "tiny.toml").string(), "-o", (study.folder / "of-a-study").string(), "--force"});
   EXPECT_EQ(over_it.exit_code, 5);

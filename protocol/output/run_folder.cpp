@@ -68,7 +68,7 @@ void refuse_if_used(const fs::path& folder) {
 // `platen run case.toml -o . --force` must not replace the user's own case by one with overrides, nor other files of his that
 // have names of ours.
 void refuse_to_replace_foreign(const fs::path& folder, const std::string& case_text) {
-  if (fs::exists(folder / "study.toml")) throw OutputError(folder.string() + ": is the folder of a study; choose another folder (-o)");
+  if (fs::exists(folder / "study.toml") && fs::is_directory(folder / "runs")) throw OutputError(folder.string() + ": is the folder of a study; choose another folder (-o)");
   if (written_by_platen(folder)) return;
   const auto refuse = [](const fs::path& file) { throw OutputError(file.string() + ": was not written by platen, as no lock and no log of a run stand beside it, and is not overwritten; choose another folder (-o)"); };
   const fs::path own_case = folder / "case.toml";
