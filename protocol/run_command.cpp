@@ -258,7 +258,8 @@ int resume_command(const ResumeCommand& command) {
   if (!has_checkpoint(path) && all_stages_done(path, c)) return say_done(command);
   std::string passed_over;
   Checkpoint from = newest_checkpoint(path, passed_over);
-  if (c.text != from.case_text)
+  // Killed between the two files of `--set`, the same command goes on.
+  if (c.text != from.case_text && (command.overrides.empty() || read_case(path / "case.toml", command.overrides, CaseUse::resume).text != from.case_text))
     throw CaseError(fmt::format("{}: is not the case that the run was begun with; put that back (dataset /case of the checkpoint has it), or begin anew with `platen run`", (path / "case.toml").string()));
   const CheckpointFacts facts = facts_of(from);
   if (!facts.within && facts.stage >= c.stages.size() && all_stages_done(path, c)) return say_done(command);  // kept by --stop-after, for `run --from`
@@ -266,7 +267,7 @@ int resume_command(const ResumeCommand& command) {
   if (!command.overrides.empty()) c = with_more_time(c, facts, command);
   catch_stop_signals(command.quiet);
   make_simulation(c, from, 1);  // fails before the folder is touched, if it does
-  if (c.text != from.case_text) {
+  if (!command.overrides.empty()) {
     from.case_text = c.text;
     for (int k = 0; k < 2; ++k) write_checkpoint(path, from);  // also the one before it
     write_whole_file(path / "case.toml", c.text);

@@ -361,7 +361,12 @@ TEST(ResumeCommand, AMissedGoalGoesOnWithMoreTime) {
   result = with("stage.compress.max_duration = 0.001");
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_TRUE(has(result.err, "stage.compress.max_duration = 0.001 s is less than it was; allowed: more than 0.02007 s")) << result.err;
+  const std::string before = read_file(run / "case.toml");
   EXPECT_EQ(with("stage.compress.max_duration=0.03").exit_code, 6) << "once more, since it was not enough";
+  // As if killed before the case was written.
+  write_file(run / "case.toml", before);
+  EXPECT_EQ(run_program({"resume", run.string(), "--no-report"}).exit_code, 3);
+  EXPECT_EQ(with("stage.compress.max_duration=0.03").exit_code, 6);
   result = with("stage.compress.max_duration=60.5");
   EXPECT_EQ(result.exit_code, 0) << result.report();
   expect_same_run(root / "whole", run);
