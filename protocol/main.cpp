@@ -59,9 +59,10 @@ CLI::Option* add_case(CLI::App& app, std::filesystem::path& file) {
   return app.add_option("CASE", file, "the case file (TOML)")->type_name("FILE")->required();
 }
 
-void add_overrides(CLI::App& app, std::vector<std::string>& overrides) {
-  app.add_option("--set", overrides, "change one key of the case; stages by name or number. May be repeated")
-      ->type_name("KEY.PATH=VALUE")
+void add_overrides(CLI::App& app, std::vector<std::string>& overrides, const char* help = "change one key of the case; stages by name or number. May be repeated",
+                   const char* form = "KEY.PATH=VALUE") {
+  app.add_option("--set", overrides, help)
+      ->type_name(form)
       ->take_all()
       ->allow_extra_args(false);
 }
@@ -122,10 +123,7 @@ Command add_resume(CLI::App& program) {
   auto walltime = std::make_shared<std::string>();
   app->add_option("DIR", command->folder, "run folder")->type_name("DIR")->required();
   add_threads(*app, command->threads);
-  app->add_option("--set", command->overrides, "give a stage that is not over more time: stage.NAME.max_duration=T. May be repeated")
-      ->type_name("KEY.PATH=VALUE")
-      ->take_all()
-      ->allow_extra_args(false);
+  add_overrides(*app, command->overrides, "give a stage that is not over more time: stage.NAME.max_duration=T. May be repeated");
   app->add_option("--max-walltime", *walltime, "stop after this time, e.g. \"90 s\", \"10 min\", \"2 h\"")->type_name("T");
   app->add_option("--stop-after", command->stop_after, "end after this stage, by name or number")->type_name("STAGE");
   app->add_flag_callback("--no-report", [command] { command->report = false; }, "write no report.html");
@@ -188,10 +186,7 @@ Command add_study(CLI::App& program) {
   app->add_option("--jobs", command->jobs, "runs at a time (default: the cores that this process may use, over the threads of a run)")
       ->type_name("J")
       ->check(CLI::Range(1, most_threads));
-  app->add_option("--set", command->overrides, "change one key of the study, as study.seeds='[1, 2, 3]'. May be repeated")
-      ->type_name("KEY=VALUE")
-      ->take_all()
-      ->allow_extra_args(false);
+  add_overrides(*app, command->overrides, "change one key of the study, as study.seeds='[1, 2, 3]'. May be repeated", "KEY=VALUE");
   app->add_flag("--reproducible", command->reproducible, "the same bits on every instruction set; somewhat slower");
   app->add_flag("--dry-run", command->dry_run, "print the runs and end");
   app->add_flag("-q,--quiet", command->quiet, "print nothing but errors, and warnings about files");
